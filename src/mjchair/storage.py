@@ -1,0 +1,68 @@
+"""Files are written whole or not at all: beside their place first, then renamed into it."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from mjchair.errors import MjchairError
+
+
+@contextmanager
+def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A temporary path beside `path`, renamed to it when the block ends without an exception.
+
+    The temporary file keeps the suffix of `path`, since writers choose the format by it.
+
+    Raises:
+      MjchairError: the folder of `path` does not exist or cannot be written.
+    """
+    target = Path(path)
+    try:
+        handle, name = tempfile.mkstemp(
+            dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix
+        )
+    except OSError as error:
+        raise MjchairError(f"cannot write {target}: {error.strerror}; give a writable folder") from None
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
+    """Write `content` to `path`, whole or not at all; see `whole` for what it raises."""
+    with whole(path) as temporary:
+        if isinstance(content, str):
+            temporary.write_text(content, encoding="utf-8")
+        else:
+            temporary.write_bytes(content)
+
+
+def output_folder(path: str | os.PathLike[str], force: bool = False) -> Path:
+    """Make the folder that a command writes into.
+
+    Args:
+      path: the folder; its parents are made as well.
+      force: allow a folder that already holds files.
+
+    Raises:
+      MjchairError: the folder holds files and `force` is false, or it cannot be made.
+    """
+    folder = Path(path)
+    if folder.is_dir() and any(folder.iterdir()) and not force:
+        raise MjchairError(f"{folder} is not empty; choose another --out, or overwrite with --force")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise MjchairError(f"cannot make {folder}: {error.strerror}") from None
+    return folder

@@ -1,0 +1,1 @@
+"""Tire files: this project's TOML."""

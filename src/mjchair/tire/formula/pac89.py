@@ -1,0 +1,121 @@
+"""The 1989 Magic Formula (Bakker, Pacejka, Lidner, SAE 890087), and the paper's part of it.
+
+Coefficients stay as published: loads in the unit of the list (N or kN), slip angles and camber in
+degrees, longitudinal slip in percent, forces in N, moments in N m. The published angle has the
+opposite force sign to ISO-W, which is converted here, once: Fy and Mz change sign.
+
+Combined slip is not in the 1989 formula. It is joined by the similarity method with the friction
+ellipse as its limit (Pacejka, Tyre and Vehicle Dynamics, 2nd ed., section 4.2): each slip
+is normalised by its own stiffness over peak, and the resultant points against the slip.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba.extending import register_jitable
+
+from mjchair.tire.block import HEADER, PNEUMATIC_TRAIL
+from mjchair.tire.formula.magic import brush_trail, magic_formula
+
+# coefficients after the header
+LOAD_UNIT = HEADER  # N in one unit of load of the list: 1 or 1000
+HAS_B = HEADER + 1  # 0: the longitudinal curve is the lateral one (isotropy)
+HAS_C = HEADER + 2  # 0: the aligning moment is the pneumatic trail's
+A = HEADER + 3  # a0..a13
+B = A + 14  # b0..b10
+C = B + 11  # c0..c17
+
+DEGREE = 180.0 / math.pi
+
+
+@register_jitable
+def lateral(p, fz, gamma):
+    """C, D, E, BCD (N/deg), Sh (deg), Sv (N): equations (9)-(15) of the paper.
+
+    Args:
+      p: the block. fz: load, in the unit of the list. gamma: camber, deg.
+    """
+    d = (p[A + 1] * fz + p[A + 2]) * fz
+    e = p[A + 6] * fz + p[A + 7]
+    # (13) is printed without the second bar of |gamma|
+    bcd = p[A + 3] * math.sin(2.0 * math.atan2(fz, p[A + 4])) * (1.0 - p[A + 5] * abs(gamma))
+    sh = p[A + 8] * gamma + p[A + 9] * fz + p[A + 10]
+    sv = p[A + 11] * gamma * fz + p[A + 12] * fz + p[A + 13]
+    return p[A], d, e, bcd, sh, sv
+
+
+@register_jitable
+def longitudinal(p, fz):
+    """C, D, E, BCD (N/%), Sh (%) of the longitudinal curve; load in the unit of the list."""
+    if p[HAS_B] == 0.0:
+        c, d, e, bcd, _, _ = lateral(p, fz, 0.0)
+        return c, d, e, bcd * DEGREE / 100.0, 0.0
+    d = (p[B + 1] * fz + p[B + 2]) * fz
+    bcd = (p[B + 3] * fz + p[B + 4]) * fz * math.exp(-p[B + 5] * fz)
+    e = (p[B + 6] * fz + p[B + 7]) * fz + p[B + 8]
+    return p[B], d, e, bcd, p[B + 9] * fz + p[B + 10]
+
+
+@register_jitable
+def aligning(p, fz, gamma):
+    """C, D, E, BCD (N m/deg), Sh (deg), Sv (N m) of the aligning moment, as published."""
+    d = (p[C + 1] * fz + p[C + 2]) * fz
+    camber = 1.0 - p[C + 6] * abs(gamma)
+    bcd = (p[C + 3] * fz + p[C + 4]) * fz * camber * math.exp(-p[C + 5] * fz)
+    e = ((p[C + 7] * fz + p[C + 8]) * fz + p[C + 9]) * (1.0 - p[C + 10] * abs(gamma))
+    sh = p[C + 11] * gamma + p[C + 12] * fz + p[C + 13]
+    sv = (p[C + 14] * fz + p[C + 15]) * fz * gamma + p[C + 16] * fz + p[C + 17]
+    return p[C], d, e, bcd, sh, sv
+
+
+@register_jitable
+def slope_factor(bcd, c, d):
+    """B = BCD / (C D), zero where the peak is."""
+    return bcd / (c * d) if c * d != 0.0 else 0.0
+
+
+@register_jitable
+def forces(p, fz, kappa, tan_alpha, gamma, speed, direction):
+    """Steady-state forces and moments; see mjchair.tire.formula. `speed` is not used."""
+    load = fz / p[LOAD_UNIT]
+    camber = gamma * DEGREE
+    cy, dy, ey, ky, shy, sv = lateral(p, load, camber)
+    cx, dx, ex, kx, shx = longitudinal(p, load)
+    by = slope_factor(ky, cy, dy)
+    bx = slope_factor(kx, cx, dx)
+    x = 100.0 * kappa + shx
+    if p[HAS_B] == 0.0:  # the lateral curve, read at the angle whose tangent is the slip
+        x = 100.0 * math.atan(kappa)
+    y = DEGREE * math.atan(tan_alpha) + shy
+
+    rho_x = kx * x / dx if dx > 0.0 else 0.0
+    rho_y = ky * y / dy if dy > 0.0 else 0.0
+    rho = math.hypot(rho_x, rho_y)
+    if rho_x == 0.0 or rho_y == 0.0 or kx <= 0.0 or ky <= 0.0:  # pure slip
+        fx = magic_formula(x, bx, cx, dx, ex)
+        fy = magic_formula(y, by, cy, dy, ey) + sv
+        share_y, turned = 1.0, y - shy
+    else:
+        share_y = abs(rho_y) / rho
+        fx = rho_x / rho * magic_formula(rho * dx / kx, bx, cx, dx, ex)
+        turned = math.copysign(rho * dy / ky, y)
+        fy = share_y * magic_formula(turned, by, cy, dy, ey) + sv / math.hypot(1.0, rho_x)
+        turned -= shy
+
+    if p[HAS_C] == 0.0:
+        mz = brush_trail(p[PNEUMATIC_TRAIL], rho) * fy
+    else:
+        cz, dz, ez, kz, shz, svz = aligning(p, load, camber)
+        bz = slope_factor(kz, cz, dz)
+        mz = share_y * -(magic_formula(turned + shz, bz, cz, dz, ez) + svz)
+    return fx, -fy, 0.0, 0.0, mz * direction
+
+
+@register_jitable
+def stiffness(p, fz, gamma, speed):
+    """Slopes at zero slip and peaks; see mjchair.tire.formula."""
+    load = fz / p[LOAD_UNIT]
+    _, dy, _, ky, _, _ = lateral(p, load, gamma * DEGREE)
+    _, dx, _, kx, _ = longitudinal(p, load)
+    return abs(kx) * 100.0, abs(ky) * DEGREE, abs(dx), abs(dy)

@@ -1,0 +1,235 @@
+"""A tire: its coefficients, what the standstill law needs, and its steady-state forces."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mjchair.errors import MjchairError, nearest
+from mjchair.tire import block, law
+from mjchair.tire.compiled import fingerprint
+from mjchair.tire.families import COEFFICIENTS
+
+FRICTION_RANGE = (0.01, 3.0)
+LOAD_UNITS = {"N": 1.0, "kN": 1000.0}
+
+
+class Forces(NamedTuple):
+    """Forces (N) and moments (N m) on the wheel in ISO-W axes, all of the broadcast shape."""
+
+    Fx: NDArray[np.float64]
+    Fy: NDArray[np.float64]
+    Mz: NDArray[np.float64]
+    Mx: NDArray[np.float64]
+    My: NDArray[np.float64]
+
+
+def quantity(default: float, unit: str, low: float, high: float, text: str) -> float:
+    """A dataclass field that carries its unit, its range and what it is."""
+    metadata = {"unit": unit, "low": low, "high": high, "text": text}
+    return field(default=default, metadata=metadata)  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True)
+class Tire:
+    """A tire of one formula family, with the numbers of the standstill law.
+
+    Frozen and validated when made.
+
+    Attributes:
+      name: of the tire.
+      family: one of mjchair.tire.block.FAMILIES.
+      coefficients: the family's, by name; those left out are 0.
+      source: where the numbers come from.
+      The others: see their metadata (unit, range, text), or `mjchair models`.
+
+    Raises:
+      MjchairError: unknown family or coefficient, a number out of its range, a peak friction
+        outside 0.01-3, which is what a list in the wrong unit gives.
+    """
+
+    name: str
+    family: str
+    coefficients: Mapping[str, float]
+    source: str = ""
+    relaxation_x: float = quantity(0.04, "m", 0.0, 2.0, "relaxation length along the heading")
+    relaxation_y: float = quantity(0.04, "m", 0.0, 2.0, "relaxation length across the heading")
+    damping_time: float = quantity(0.005, "s", 0.0, 0.1, "carcass damping over stiffness")
+    rolling_resistance: float = quantity(0.0, "1", 0.0, 0.5, "rolling moment over load and radius")
+    rolling_relaxation: float = quantity(
+        0.003, "m", 1e-5, 0.1, "distance over which the rolling moment builds up"
+    )
+    rolling_damping_time: float = quantity(0.2, "s", 0.0, 2.0, "damping of the rolling moment")
+    turning_moment: float = quantity(0.0, "N m", 0.0, 100.0, "moment against the yaw rate")
+    friction_factor: float = quantity(1.0, "1", 0.01, 100.0, "scales the peak force")
+    stiffness_factor: float = quantity(1.0, "1", 0.01, 100.0, "scales the slip stiffness")
+    load_exponent: float = quantity(
+        0.0, "1", -1.0, 1.0, "force over load falls with (Fz / nominal load) ** -exponent"
+    )
+    nominal_load: float = quantity(300.0, "N", 1.0, 1e5, "load of the checks and of the exponent")
+    pneumatic_trail: float = quantity(
+        0.0, "m", 0.0, 0.5, "at zero slip, where the family has no aligning moment of its own"
+    )
+    slide_speed: float = quantity(0.05, "m/s", 1e-4, 10.0, "slip speed of sliding at standstill")
+    radius: float = quantity(0.3, "m", 0.01, 2.0, "unloaded radius of the tire as measured")
+
+    def __post_init__(self) -> None:
+        """Freeze the coefficients and check every number."""
+        if self.family not in COEFFICIENTS:
+            raise MjchairError(
+                f"tire {self.name}: unknown family {self.family!r}"
+                + nearest(self.family, COEFFICIENTS)
+            )
+        names = COEFFICIENTS[self.family]
+        for key, value in self.coefficients.items():
+            if key not in names:
+                raise MjchairError(
+                    f"tire {self.name}: unknown {self.family} coefficient {key!r}"
+                    + nearest(key, names)
+                )
+            if not math.isfinite(value):
+                raise MjchairError(f"tire {self.name}: {key} is {value}; it must be finite")
+        object.__setattr__(
+            self,
+            "coefficients",
+            MappingProxyType({k: float(v) for k, v in self.coefficients.items()}),
+        )
+        for item in fields(self):
+            if not item.metadata:
+                continue
+            value = getattr(self, item.name)
+            low, high = item.metadata["low"], item.metadata["high"]
+            if not low <= value <= high:
+                raise MjchairError(
+                    f"tire {self.name}: {item.name} is {value:g} {item.metadata['unit']}; "
+                    f"it must be within {low:g} to {high:g}"
+                )
+        self._check_friction()
+
+    def _check_friction(self) -> None:
+        peak = self.peak_friction(self.nominal_load)
+        for axis, value in zip(("longitudinal", "lateral"), peak, strict=True):
+            if not FRICTION_RANGE[0] <= value <= FRICTION_RANGE[1]:
+                hint = "; is it meant in kN, or in N?" if "load_unit" in self.coefficients else ""
+                raise MjchairError(
+                    f"tire {self.name}: {axis} peak friction is {value:.4g} at "
+                    f"{self.nominal_load:g} N; it must be within 0.01 to 3{hint}"
+                )
+
+    def peak_friction(self, fz: float) -> tuple[float, float]:
+        """Peak force over load, along and across the heading, at the load `fz` (N)."""
+        packed = self.block()
+        _, _, d_x, d_y = law.family_stiffness(packed, fz, 0.0, 1.0)
+        peak, _ = law.factors(packed, fz)
+        return d_x * peak / fz, d_y * peak / fz
+
+    def block(self) -> NDArray[np.float64]:
+        """The tire as numbers, in the order of mjchair.tire.block."""
+        names = COEFFICIENTS[self.family]
+        packed = np.zeros(block.HEADER + len(names))
+        packed[block.TAG_AT] = block.TAG
+        packed[block.VERSION_AT] = block.VERSION
+        packed[block.FAMILY] = block.FAMILIES.index(self.family)
+        for item in fields(self):
+            if item.metadata:
+                packed[getattr(block, item.name.upper())] = getattr(self, item.name)
+        packed[block.HEADER :] = [self.coefficients.get(name, 0.0) for name in names]
+        return packed
+
+    def forces(
+        self,
+        fz: ArrayLike,
+        kappa: ArrayLike,
+        alpha: ArrayLike,
+        gamma: ArrayLike = 0.0,
+        speed: ArrayLike = 1.0,
+    ) -> Forces:
+        """Steady-state forces, ISO-W; the arguments broadcast.
+
+        Args:
+          fz: load, N; none at 0 or below. kappa: longitudinal slip, 1, positive when driving.
+          alpha: slip angle, rad; a positive one gives a negative Fy.
+          gamma: camber, rad, about +x. speed: of the wheel along its heading, m/s.
+        """
+        given = np.broadcast_arrays(fz, kappa, np.tan(np.asarray(alpha, float)), gamma, speed)
+        shape = given[0].shape
+        flat = [np.ascontiguousarray(array, dtype=np.float64).ravel() for array in given]
+        out = np.empty((flat[0].size, 5))
+        _forces_loop()(self.block(), *flat, out)
+        fx, fy, mx, my, mz = (out[:, i].reshape(shape) for i in range(5))
+        return Forces(fx, fy, mz, mx, my)
+
+    def with_(self, **changes: float) -> Tire:
+        """A copy with other numbers, checked like a new one."""
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+
+@functools.cache
+def _forces_loop() -> Callable[..., None]:
+    """The compiled loop over arrays of load, slip, camber and speed."""
+    sources = fingerprint("tire")
+
+    @numba.njit(cache=True)  # type: ignore[untyped-decorator]
+    def loop(p, fz, kappa, tan_alpha, gamma, speed, out):  # type: ignore[no-untyped-def]
+        _ = sources
+        for i in range(fz.size):
+            direction = np.sign(speed[i])
+            out[i, 0], out[i, 1], out[i, 2], out[i, 3], out[i, 4] = law.steady_forces(
+                p,
+                fz[i],
+                kappa[i],
+                tan_alpha[i],
+                gamma[i],
+                speed[i],
+                direction,
+                p[block.RADIUS],
+                1.0,
+            )
+
+    return loop
+
+
+def Pac89(  # noqa: N802  (a family's constructor, named as the family is)
+    a: Sequence[float] | Mapping[str, float],
+    b: Sequence[float] | Mapping[str, float] | None = None,
+    c: Sequence[float] | Mapping[str, float] | None = None,
+    load_unit: str = "kN",
+    name: str = "pac89",
+    **numbers: float | str,
+) -> Tire:
+    """A tire of the 1989 Magic Formula from its lists as published (deg, percent).
+
+    Args:
+      a: a0..a13, lateral. A shorter list is filled with zeros; a mapping names its entries.
+      b: b0..b10, longitudinal. None: the lateral curve serves along as well.
+      c: c0..c17, aligning moment. None: from the pneumatic trail.
+      load_unit: "kN" or "N", the unit of load of the lists.
+      name: of the tire. numbers: other fields of Tire.
+
+    Raises:
+      MjchairError: unknown unit, too many coefficients, or as Tire does.
+    """
+    if load_unit not in LOAD_UNITS:
+        raise MjchairError(f"load_unit {load_unit!r}" + nearest(load_unit, LOAD_UNITS))
+    coefficients = {
+        "load_unit": LOAD_UNITS[load_unit],
+        "has_b": float(b is not None),
+        "has_c": float(c is not None),
+    }
+    for letter, given, count in (("a", a, 14), ("b", b, 11), ("c", c, 18)):
+        if given is None:
+            continue
+        if not isinstance(given, Mapping):
+            if len(given) > count:
+                raise MjchairError(f"{letter} has {len(given)} coefficients; at most {count}")
+            given = {f"{letter}{i}": value for i, value in enumerate(given)}
+        coefficients.update(given)
+    return Tire(name=name, family="pac89", coefficients=coefficients, **numbers)  # type: ignore[arg-type]
