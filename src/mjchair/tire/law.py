@@ -11,11 +11,12 @@ import math
 from numba.extending import register_jitable
 
 from mjchair.tire import block
-from mjchair.tire.formula import linear, pac89
+from mjchair.tire.formula import linear, mf61, pac89
 from mjchair.tire.transient import relax
 
 pac89_forces, pac89_stiffness = pac89.forces, pac89.stiffness
 linear_forces, linear_stiffness = linear.forces, linear.stiffness
+mf_forces, mf_stiffness, mf_relaxation = mf61.forces, mf61.stiffness, mf61.relaxation
 
 
 @register_jitable
@@ -23,6 +24,8 @@ def family_forces(p, fz, kappa, tan_alpha, gamma, speed, direction):
     """Forces of the family that the block `p` names; see mjchair.tire.formula."""
     if p[block.FAMILY] == block.PAC89:
         return pac89_forces(p, fz, kappa, tan_alpha, gamma, speed, direction)
+    if p[block.FAMILY] >= block.MF52:
+        return mf_forces(p, fz, kappa, tan_alpha, gamma, speed, direction)
     return linear_forces(p, fz, kappa, tan_alpha, gamma, speed, direction)
 
 
@@ -31,13 +34,20 @@ def family_stiffness(p, fz, gamma, speed):
     """Slopes and peaks of the family that the block `p` names; see mjchair.tire.formula."""
     if p[block.FAMILY] == block.PAC89:
         return pac89_stiffness(p, fz, gamma, speed)
+    if p[block.FAMILY] >= block.MF52:
+        return mf_stiffness(p, fz, gamma, speed)
     return linear_stiffness(p, fz, gamma, speed)
 
 
 @register_jitable
 def family_relaxation(p, fz, c_kappa, c_alpha):
-    """Relaxation lengths (m) along and across."""
-    return p[block.RELAXATION_X], p[block.RELAXATION_Y]
+    """Relaxation lengths (m) along and across: the block's, or the family's own where that is 0."""
+    x, y = p[block.RELAXATION_X], p[block.RELAXATION_Y]
+    if p[block.FAMILY] >= block.MF52 and (x == 0.0 or y == 0.0):
+        own_x, own_y = mf_relaxation(p, fz, c_kappa, c_alpha)
+        x = own_x if x == 0.0 else x
+        y = own_y if y == 0.0 else y
+    return x, y
 
 
 @register_jitable
@@ -50,7 +60,7 @@ def factors(p, fz):
 
 
 @register_jitable
-def steady_forces(p, fz, kappa, tan_alpha, gamma, speed, direction, radius, friction):
+def steady_forces(p, fz, kappa, tan_alpha, gamma, speed, direction, braked, radius, friction):
     """Steady-state forces and moments of one tire.
 
     The factors scale the curve by similarity (Pacejka 2006, section 4.2.1): the slip by stiffness
@@ -60,8 +70,8 @@ def steady_forces(p, fz, kappa, tan_alpha, gamma, speed, direction, radius, fric
       p: the block of mjchair.tire.block.
       fz: load, N, not negative. kappa: longitudinal slip, 1, positive when driving.
       tan_alpha: Vsy / |Vx|, 1. gamma: camber, rad, about +x. speed: Vx, m/s.
-      direction: of rolling, -1 to 1. radius: of rolling, m.
-      friction: factor of the road, 1.
+      direction: of rolling, -1 to 1. braked: the same for the rolling moment, which is damped.
+      radius: of rolling, m. friction: factor of the road, 1.
 
     Returns:
       Fx, Fy (N), Mx, My, Mz (N m) on the wheel, ISO-W axes.
@@ -74,7 +84,7 @@ def steady_forces(p, fz, kappa, tan_alpha, gamma, speed, direction, radius, fric
     fx, fy, mx, my, mz = family_forces(
         p, fz, kappa * stretch, tan_alpha * stretch, gamma, speed, direction
     )
-    my = (my - p[block.ROLLING_RESISTANCE] * fz * radius) * direction
+    my = (my - p[block.ROLLING_RESISTANCE] * fz * radius) * braked
     return peak * fx, peak * fy, mx, my, peak * mz
 
 
@@ -135,14 +145,14 @@ def step_tire(p, u, w, r, fz, gamma, vx, vsx, vsy, spin, yaw_rate, radius, added
     new_r = relax(r, spin * radius, spin * radius, roll_length, h)
     direction = new_r / roll_length
 
+    braked = direction + p[block.ROLLING_DAMPING_TIME] * (new_r - r) / (h * roll_length)
+    braked = min(max(braked, -1.0), 1.0)
+
     kappa, tan_alpha = -new_u / sigma_x, new_w / sigma_y
     fx, fy, mx, my, mz = steady_forces(
-        p, fz, kappa, tan_alpha, gamma, vx, 1.0, radius, friction
+        p, fz, kappa, tan_alpha, gamma, vx, direction, braked, radius, friction
     )
-    my -= added * fz * radius
-    braked = direction + p[block.ROLLING_DAMPING_TIME] * (new_r - r) / (h * roll_length)
-    my *= min(max(braked, -1.0), 1.0)
-    mz *= direction
+    my -= added * fz * radius * braked
     mz -= p[block.TURNING_MOMENT] * math.tanh(yaw_rate / 0.05)
 
     damping = p[block.DAMPING_TIME] / h

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from mjchair.errors import MjchairError, nearest
 from mjchair.tire import block, law
 from mjchair.tire.compiled import fingerprint
-from mjchair.tire.families import COEFFICIENTS
+from mjchair.tire.families import COEFFICIENTS, packed
 
 FRICTION_RANGE = (0.01, 3.0)
 LOAD_UNITS = {"N": 1.0, "kN": 1000.0}
@@ -115,6 +115,11 @@ class Tire:
                     f"tire {self.name}: {item.name} is {value:g} {item.metadata['unit']}; "
                     f"it must be within {low:g} to {high:g}"
                 )
+            if value == 0.0 and item.name.startswith("relaxation") and "mf" not in self.family:
+                raise MjchairError(
+                    f"tire {self.name}: {item.name} is 0, and the family {self.family} has none of "
+                    f"its own; give one above 0 m"
+                )
         self._check_friction()
 
     def _check_friction(self) -> None:
@@ -136,16 +141,14 @@ class Tire:
 
     def block(self) -> NDArray[np.float64]:
         """The tire as numbers, in the order of mjchair.tire.block."""
-        names = COEFFICIENTS[self.family]
-        packed = np.zeros(block.HEADER + len(names))
-        packed[block.TAG_AT] = block.TAG
-        packed[block.VERSION_AT] = block.VERSION
-        packed[block.FAMILY] = block.FAMILIES.index(self.family)
+        header = np.zeros(block.HEADER)
+        header[block.TAG_AT] = block.TAG
+        header[block.VERSION_AT] = block.VERSION
+        header[block.FAMILY] = block.FAMILIES.index(self.family)
         for item in fields(self):
             if item.metadata:
-                packed[getattr(block, item.name.upper())] = getattr(self, item.name)
-        packed[block.HEADER :] = [self.coefficients.get(name, 0.0) for name in names]
-        return packed
+                header[getattr(block, item.name.upper())] = getattr(self, item.name)
+        return np.concatenate([header, packed(self.family, self.coefficients, self.radius)])
 
     def forces(
         self,
@@ -192,6 +195,7 @@ def _forces_loop() -> Callable[..., None]:
                 tan_alpha[i],
                 gamma[i],
                 speed[i],
+                direction,
                 direction,
                 p[block.RADIUS],
                 1.0,
