@@ -49,6 +49,7 @@ class Tire:
       family: one of mjchair.tire.block.FAMILIES.
       coefficients: the family's, by name; those left out are 0.
       source: where the numbers come from.
+      unused: what its file has and this project does not use, as "SECTION.KEY": text.
       The others: see their metadata (unit, range, text), or `mjchair models`.
 
     Raises:
@@ -60,6 +61,7 @@ class Tire:
     family: str
     coefficients: Mapping[str, float]
     source: str = ""
+    unused: Mapping[str, str] = field(default_factory=dict)
     relaxation_x: float = quantity(0.04, "m", 0.0, 2.0, "relaxation length along the heading")
     relaxation_y: float = quantity(0.04, "m", 0.0, 2.0, "relaxation length across the heading")
     damping_time: float = quantity(0.005, "s", 0.0, 0.1, "carcass damping over stiffness")
@@ -102,6 +104,7 @@ class Tire:
             "coefficients",
             MappingProxyType({k: float(v) for k, v in self.coefficients.items()}),
         )
+        object.__setattr__(self, "unused", MappingProxyType(dict(self.unused)))
         for item in fields(self):
             if not item.metadata:
                 continue
@@ -197,7 +200,7 @@ def _forces_loop() -> Callable[..., None]:
     return loop
 
 
-def Pac89(  # noqa: N802  (a family's constructor, named as the family is)
+def Pac89(
     a: Sequence[float] | Mapping[str, float],
     b: Sequence[float] | Mapping[str, float] | None = None,
     c: Sequence[float] | Mapping[str, float] | None = None,
