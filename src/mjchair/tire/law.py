@@ -51,6 +51,15 @@ def family_relaxation(p, fz, c_kappa, c_alpha):
 
 
 @register_jitable
+def relaxation(p, fz, gamma):
+    """Relaxation lengths (m) along and across at this load, for whoever has no stiffness yet."""
+    if p[block.RELAXATION_X] > 0.0 and p[block.RELAXATION_Y] > 0.0:
+        return p[block.RELAXATION_X], p[block.RELAXATION_Y]
+    c_kappa, c_alpha, _, _ = family_stiffness(p, max(fz, 1.0), gamma, 0.0)
+    return family_relaxation(p, fz, c_kappa, c_alpha)
+
+
+@register_jitable
 def factors(p, fz):
     """Peak and stiffness factors of the block at this load."""
     share = 1.0

@@ -1,0 +1,1 @@
+"""The tires inside MuJoCo: where its fields lie, and the callbacks that act on them."""
