@@ -98,19 +98,22 @@ def steady_forces(p, fz, kappa, tan_alpha, gamma, speed, direction, braked, radi
 
 
 @register_jitable
-def held_slip(u, w, limit_u, limit_w, vx, vsx, vsy, slide_speed):
+def held_slip(u, w, limit_u, limit_w, sigma_x, sigma_y, vx, vsx, vsy, slide_speed):
     """Deflections cut back where the tire slides, so that nothing winds up.
 
     A deflection may stand for as much slip as slides (three times the knee D/C), or for the
-    kinematic slip where that is more, with `slide_speed` added to the rolling speed.
+    kinematic slip where that is more. A wheel that slides without rolling has `slide_speed` added
+    to its rolling speed; one that rolls, however slowly, has next to nothing added.
     """
     size = math.hypot(u / limit_u, w / limit_w)
     if size <= 1.0:
         return u, w
-    rolled = abs(vx) + slide_speed
-    kinematic = math.hypot(vsx / limit_u, vsy / limit_w) / rolled
-    # the limits are deflections; the kinematic slip turns into one by the relaxation length,
-    # which the caller has divided out of vsx and vsy
+    slip = vsx * vsx + vsy * vsy
+    sliding = slip / (slip + vx * vx) if slip > 0.0 else 0.0
+    rolled = abs(vx) + slide_speed * sliding**4
+    if rolled == 0.0:
+        return u / size, w / size
+    kinematic = math.hypot(vsx * sigma_x / limit_u, vsy * sigma_y / limit_w) / rolled
     allowed = max(1.0, kinematic)
     return (u * allowed / size, w * allowed / size) if size > allowed else (u, w)
 
@@ -145,9 +148,11 @@ def step_tire(p, u, w, r, fz, gamma, vx, vsx, vsy, spin, yaw_rate, radius, added
         new_w,
         3.0 * sigma_x * d_x / c_kappa,
         3.0 * sigma_y * d_y / c_alpha,
+        sigma_x,
+        sigma_y,
         vx,
-        vsx * sigma_x,
-        vsy * sigma_y,
+        vsx,
+        vsy,
         p[block.SLIDE_SPEED],
     )
     roll_length = p[block.ROLLING_RELAXATION]

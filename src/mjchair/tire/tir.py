@@ -70,7 +70,7 @@ def parse(text: str, stem: str) -> Tire:
     family = _family(_section(raw, "MODEL"))
     for section in REQUIRED[family]:
         _section(raw, section)
-    own = raw.get(OWN, {})
+    own = {key: _bare(text) for key, text in raw.get(OWN, {}).items()}
     coefficients = _coefficients(raw, family)
     if family == "pac89":
         unit = {"KN": 1000.0, "N": 1.0}.get(own.get("LOAD_UNIT", "kN").upper())
@@ -114,8 +114,8 @@ def compose(tire: Tire) -> str:
         _put(out, section, {name: repr(value) for name, value in found.items()})
     _put(out, OWN, _own_lines(tire))
     first = ("MDI_HEADER", "UNITS", "MODEL")
-    names = [*first, *(name for name in out if name not in first)]
-    return "".join(_section_text(name, out[name]) for name in names if name in out)
+    ordered = [*first, *(name for name in out if name not in first)]
+    return "".join(_section_text(name, out[name]) for name in ordered if name in out)
 
 
 def _said_format(model: Mapping[str, str]) -> bool:
@@ -281,7 +281,7 @@ def _fields(
         radius = _number("DIMENSION", "UNLOADED_RADIUS", text)
     if radius:
         numbers["radius"] = radius
-    nominal = coefficients.get("FNOMIN", 2000.0)
+    nominal = coefficients.get("FNOMIN") or 2000.0
     numbers["nominal_load"] = nominal
     known = {item.name.upper(): item.name for item in fields(Tire) if item.metadata}
     for key, text in own.items():
