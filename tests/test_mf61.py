@@ -117,6 +117,16 @@ def test_everything_stays_finite_and_loads_beyond_the_range_are_held():
     assert held.forces(1e-6, 0.1, 0.1).Fy == pytest.approx(0.0, abs=1e-4)
 
 
+def test_without_combined_coefficients_the_friction_ellipse_limits():
+    bare = {k: v for k, v in book().items() if k[0] != "R"}
+    wheel = Tire(name="t", family="mf61", coefficients=bare, nominal_load=4000.0)
+    d_x, d_y = np.array(wheel.peak_friction(4000.0)) * 4000.0
+    both = wheel.forces(4000.0, 0.15, 0.2)
+    assert np.hypot(both.Fx / d_x, both.Fy / d_y) == pytest.approx(1.0, abs=0.05)
+    along = wheel.forces(4000.0, 0.15, 0.0).Fx
+    assert along == pytest.approx(tire().forces(4000.0, 0.15, 0.0).Fx, rel=1e-2)
+
+
 def test_shifts_pass_through_zero_at_standstill_and_turn_with_the_direction():
     wheel = tire()
     forward, still, back = (wheel.forces(4000.0, 0.0, 0.0, speed=v).Fy for v in (5.0, 0.0, -5.0))

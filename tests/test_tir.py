@@ -69,7 +69,7 @@ def put(tmp_path, content, name="book.tir"):
     return path
 
 
-@pytest.mark.parametrize(("fit", "family"), [(61, "mf61"), (62, "mf61"), (6, "mf52")])
+@pytest.mark.parametrize(("fit", "family"), [(61, "mf61"), (62, "mf61"), (6, "mf52"), (5, "mf52")])
 def test_a_file_reads_and_is_written_back(tmp_path, fit, family):
     tire = read(put(tmp_path, text(fit)))
     assert tire.family == family

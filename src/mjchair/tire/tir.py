@@ -26,8 +26,8 @@ UNITS = {
 }
 # FITTYP, or PROPERTY_FILE_FORMAT where there is none
 FORMATS = {
+    "5": "mf52",  # MF-Tyre 5.0 and 5.1: the names and the form of 5.2
     "6": "mf52",
-    "52": "mf52",
     "61": "mf61",
     "62": "mf61",
     "PAC2002": "mf52",

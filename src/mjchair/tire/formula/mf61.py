@@ -12,6 +12,7 @@ What is done beyond the equations, and why:
 - Load, slips and camber are held to the ranges of the file, as trusted codes do. Below FZMIN the
   equations are simply used: they vanish with the load. Curvature factors stay at 1 or less, and
   peaks and stiffnesses keep their sign.
+- A file without coefficients of combined slip has its forces held to the friction ellipse.
 - There is no low-speed branch: the tire's deflections carry standstill. Instead the shifts that
   come of ply steer and rolling (SHx, SVx, SHy, SVy without camber) follow the direction of
   rolling, which passes through 0 smoothly at standstill; camber thrust does not turn with it.
@@ -224,6 +225,16 @@ def residual_mz(p, fz, dfz, slip, camber, kya, sh, sv, stretch):
 
 
 @register_jitable
+def within_ellipse(fx, fy, d_x, d_y):
+    """Both forces cut to the friction ellipse, but neither alone to less than it was."""
+    if d_x == 0.0 or d_y == 0.0:
+        return fx, fy
+    x, y = abs(fx / d_x), abs(fy / d_y)
+    cut = max(1.0, x, y) / max(1.0, math.hypot(x, y), x, y)
+    return fx * cut, fy * cut
+
+
+@register_jitable
 def overturning(p, fz, fy, gamma):
     """Mx (N m), (49) of the draft of Besselink, Schmeitz & Pacejka (2010)."""
     m = p[AT.X1] - p[AT.X2] * gamma + p[AT.X3] * fy - p[AT.X12] * gamma * abs(gamma)
@@ -268,6 +279,10 @@ def forces(p, fz, kappa, tan_alpha, gamma, speed, direction):
     induced = induced_fy(p, fz, dfz, kappa, slip, camber)
     fx = share_x(p, dfz, kappa, slip, camber, direction) * fx0
     fy = side * fy0 + induced
+    if p[AT.BXA] == 0.0 and p[AT.BYK] == 0.0:
+        fx, fy = within_ellipse(
+            fx, fy, friction_x(p, dfz, gamma) * fz, friction_y(p, dfz, camber) * fz
+        )
 
     stretch = (kxk * kappa / kya) ** 2 if kya != 0.0 else 0.0
     upright = fy0
