@@ -14,6 +14,8 @@ from mjchair.tire import block
 from mjchair.tire.formula import linear, pac89
 from mjchair.tire.transient import relax
 
+TURNING_RATE = 0.05  # rad/s, over which the turning moment's sign is smoothed; assumed
+
 pac89_forces, pac89_stiffness = pac89.forces, pac89.stiffness
 linear_forces, linear_stiffness = linear.forces, linear.stiffness
 
@@ -145,14 +147,13 @@ def step_tire(p, u, w, r, fz, gamma, vx, vsx, vsy, spin, yaw_rate, radius, added
     direction = new_r / roll_length
 
     kappa, tan_alpha = -new_u / sigma_x, new_w / sigma_y
-    fx, fy, mx, my, mz = steady_forces(
-        p, fz, kappa, tan_alpha, gamma, vx, 1.0, radius, friction
-    )
+    fx, fy, mx, my, mz = steady_forces(p, fz, kappa, tan_alpha, gamma, vx, 1.0, radius, friction)
     my -= added * fz * radius
     braked = direction + p[block.ROLLING_DAMPING_TIME] * (new_r - r) / (h * roll_length)
     my *= min(max(braked, -1.0), 1.0)
     mz *= direction
-    mz -= p[block.TURNING_MOMENT] * math.tanh(yaw_rate / 0.05)
+    if p[block.TURNING_MOMENT] != 0.0:
+        mz -= p[block.TURNING_MOMENT] * math.tanh(yaw_rate / TURNING_RATE)
 
     damping = p[block.DAMPING_TIME] / h
     total_x = fx - damping * c_kappa / sigma_x * (new_u - u)
