@@ -19,7 +19,7 @@ STAGE_ACC = int(mjtStage.mjSTAGE_ACC)
 MANY = 1 << 40  # bounds are not checked: only the trailing sizes matter
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]
 def _pointer(typingctx: Any, address: Any, kind: Any) -> Any:
     """A typed pointer from an address."""
     target = types.CPointer(kind.dtype)
@@ -30,7 +30,7 @@ def _pointer(typingctx: Any, address: Any, kind: Any) -> Any:
     return target(address, kind), build
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]
 def _load(typingctx: Any, address: Any, kind: Any) -> Any:
     """The number of the given kind that lies at an address."""
 

@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -22,7 +23,6 @@ from mjchair.tire import Tire, block
 
 TireChoice = str | os.PathLike[str] | Tire
 FLOOR = "floor"
-GROUND = "ground"  # the frame of a scene that carries floor and chair
 GROUPS = {"wheels": WHEELS[:2], "casters": WHEELS[2:]}
 DEFAULT_TIRES = {"wheels": "wheelchair", "casters": "caster"}
 
@@ -43,7 +43,8 @@ def load_spec(
     Args:
       model: a shipped chair, or a path to MJCF. A file that brings a geom `floor` of its own, as
         a saved chair does, is taken whole: the scene is not used, and its tires stay.
-      scene: a shipped scene, or a path to MJCF with a frame `ground`.
+      scene: a shipped scene, or a path to MJCF with a geom `floor`, which the chair stands on:
+        at its origin, in its orientation.
       tire: a shipped tire, a path, or a Tire for all wheels; or a mapping from wheel names,
         "wheels" or "casters" to those. None: the tires that the file has, else the default ones.
       grade: rise over run of the ramp (along +x) or of the cross slope (along +y), 1.
@@ -109,28 +110,53 @@ def _read(path: os.PathLike[str]) -> mujoco.MjSpec:
 
 
 def _place(chair: mujoco.MjSpec, scene: mujoco.MjSpec) -> mujoco.MjSpec:
-    """Attach the chair to the scene's frame `ground`; options are the chair's."""
-    exact_xml()
-    frame = next((f for f in scene.frames if f.name == GROUND), None)
-    if frame is None:
+    """Stand the chair on the scene's floor: at its origin, in its orientation.
+
+    Options that decide how the chair rolls are the chair's.
+    """
+    floor = scene.geom(FLOOR)
+    if floor is None:
         raise MjchairError(
-            f"scene {scene.modelname!r} has no frame {GROUND!r} to stand the chair on; "
-            "put its floor into a frame of that name"
+            f"scene {scene.modelname!r} has no geom {FLOOR!r} to stand the chair on; name its floor so"
         )
+    exact_xml()
     for field in ("timestep", "integrator", "cone", "tolerance"):
         setattr(scene.option, field, getattr(chair.option, field))
+    for body in chair.worldbody.bodies:
+        body.pos, body.quat = _carried(floor, body.pos, body.quat)
     chair.default.name = f"{chair.modelname}_default"  # without a name it could not be saved
     folder = chair.modelfiledir
     with _silent():
-        scene.attach(chair, frame=frame, prefix="")
+        scene.attach(chair, frame=scene.worldbody.add_frame(), prefix="")
         scene.modelname = f"{chair.modelname} on {scene.modelname}"
         compile_spec(scene)
         text = scene.to_xml()
     # attached without a prefix, a specification warns whenever it compiles and may differ from
     # what it saves; read back, it is what it saves
-    placed = mujoco.MjSpec.from_string(text)
+    placed = mujoco.MjSpec.from_string(_without_plain_frames(text))
     placed.modelfiledir = folder
     return placed
+
+
+def _carried(floor: mujoco.MjsGeom, pos: np.ndarray, quat: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Position and orientation on the floor of what would stand so at the world's origin."""
+    turned, at = np.zeros(4), np.zeros(3)
+    mujoco.mju_mulQuat(turned, floor.quat, quat)
+    mujoco.mju_rotVecQuat(at, pos, floor.quat)
+    return at + floor.pos, turned
+
+
+def _without_plain_frames(text: str) -> str:
+    """MJCF without the frames that change nothing, which PyMJCF cannot read."""
+    root = ElementTree.fromstring(text)
+    for parent in root.iter():
+        for frame in parent.findall("frame"):
+            if set(frame.attrib) <= {"name"}:
+                at = list(parent).index(frame)
+                parent.remove(frame)
+                for child in reversed(frame):
+                    parent.insert(at, child)
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 @contextmanager
@@ -160,18 +186,18 @@ def set_grade(spec: mujoco.MjSpec, scene: str, grade: float | None, tilt: str = 
         return
     if scene not in axes:
         raise MjchairError(f"scene {scene!r} has no grade" + nearest(scene, axes))
-    frame = next(f for f in spec.frames if f.name == GROUND)
+    floor = spec.geom(FLOOR)
     if grade is not None:
         if not math.isfinite(grade):
             raise MjchairError(f"grade is {grade}; it must be a finite rise over run, such as 0.08")
         half = 0.5 * math.atan(grade)
-        frame.quat = np.r_[math.cos(half), math.sin(half) * np.array(axes[scene])]
+        floor.quat = np.r_[math.cos(half), math.sin(half) * np.array(axes[scene])]
     if tilt == "gravity":
         down = np.zeros(3)
-        back = np.r_[frame.quat[0], -np.asarray(frame.quat[1:])]
+        back = np.r_[floor.quat[0], -np.asarray(floor.quat[1:])]
         mujoco.mju_rotVecQuat(down, np.asarray(spec.option.gravity), back)
         spec.option.gravity = down
-        frame.quat = (1.0, 0.0, 0.0, 0.0)
+        floor.quat = (1.0, 0.0, 0.0, 0.0)
 
 
 def set_tires(

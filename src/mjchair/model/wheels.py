@@ -145,14 +145,10 @@ def _springs(model: mujoco.MjModel, wheel: Wheel) -> list[tuple[str, float, floa
     sigma_x, sigma_y = law.family_relaxation(tire, load, c_kappa, c_alpha)
     slope = law.factors(tire, load)[1]
     rolling = tire[block.ROLLING_RESISTANCE] * load * radius**2 / tire[block.ROLLING_RELAXATION]
-    k = (slope * c_kappa / sigma_x, slope * c_alpha / sigma_y, rolling)
+    stiffness = (slope * c_kappa / sigma_x, slope * c_alpha / sigma_y, rolling)
     times = [tire[i] for i in (block.DAMPING_TIME, block.DAMPING_TIME, block.ROLLING_DAMPING_TIME)]
-    return [
-        (axis, stiffness, stiffness * time)
-        for axis, stiffness, time in zip(
-            ("along", "across", "about its axle"), k, times, strict=True
-        )
-    ]
+    axes = ("along", "across", "about its axle")
+    return [(axis, k, k * time) for axis, k, time in zip(axes, stiffness, times, strict=True)]
 
 
 def contact_inertia(
