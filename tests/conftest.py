@@ -1,0 +1,47 @@
+import mujoco
+import numpy as np
+import pytest
+
+import mjchair
+
+SLALOM_STEPS = 1500
+
+
+@pytest.fixture(autouse=True)
+def no_callbacks_leak():
+    """Every test starts and ends without callbacks."""
+    mjchair.uninstall()
+    yield
+    mjchair.uninstall()
+
+
+@pytest.fixture(scope="session")
+def manual_spec():
+    return mjchair.load_spec("manual")
+
+
+@pytest.fixture
+def manual(manual_spec):
+    return manual_spec.compile()
+
+
+def slalom(model: mujoco.MjModel, steps: int = SLALOM_STEPS, prefix: str = "") -> np.ndarray:
+    """Controls (steps, nu) of a winding run: common drive, opposite torques left and right."""
+    time = np.arange(steps) * model.opt.timestep
+    control = np.zeros((steps, model.nu))
+    turn = 2.5 * np.sin(2 * np.pi * time / 1.6)
+    for name, sign in (("left_wheel", -1.0), ("right_wheel", 1.0)):
+        control[:, model.actuator(prefix + name).id] = 4.0 + sign * turn
+    return control
+
+
+def roll(model: mujoco.MjModel, control: np.ndarray, data: mujoco.MjData | None = None):
+    """States (steps, n) after each step of mj_step under the controls."""
+    data = data or mujoco.MjData(model)
+    spec = mujoco.mjtState.mjSTATE_FULLPHYSICS
+    states = np.empty((len(control), mujoco.mj_stateSize(model, spec)))
+    for row, state in zip(control, states, strict=True):
+        data.ctrl[:] = row
+        mujoco.mj_step(model, data)
+        mujoco.mj_getState(model, data, state, spec)
+    return states

@@ -26,7 +26,9 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
             dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix
         )
     except OSError as error:
-        raise MjchairError(f"cannot write {target}: {error.strerror}; give a writable folder") from None
+        raise MjchairError(
+            f"cannot write {target}: {error.strerror}; give a writable folder"
+        ) from None
     os.close(handle)
     temporary = Path(name)
     try:
@@ -60,7 +62,9 @@ def output_folder(path: str | os.PathLike[str], force: bool = False) -> Path:
     """
     folder = Path(path)
     if folder.is_dir() and any(folder.iterdir()) and not force:
-        raise MjchairError(f"{folder} is not empty; choose another --out, or overwrite with --force")
+        raise MjchairError(
+            f"{folder} is not empty; choose another --out, or overwrite with --force"
+        )
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

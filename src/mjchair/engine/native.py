@@ -19,7 +19,7 @@ STAGE_ACC = int(mjtStage.mjSTAGE_ACC)
 MANY = 1 << 40  # bounds are not checked: only the trailing sizes matter
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]
 def _pointer(typingctx: Any, address: Any, kind: Any) -> Any:
     """A typed pointer from an address."""
     target = types.CPointer(kind.dtype)
@@ -30,7 +30,7 @@ def _pointer(typingctx: Any, address: Any, kind: Any) -> Any:
     return target(address, kind), build
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]
 def _load(typingctx: Any, address: Any, kind: Any) -> Any:
     """The number of the given kind that lies at an address."""
 
@@ -93,7 +93,7 @@ def callbacks() -> tuple[Any, Any]:
     om, od, (nuser_geom, nuser_sensor, ncon, contact) = _offsets()
     size = layout.contact_size()
 
-    @njit  # type: ignore[untyped-decorator]
+    @njit(error_model="numpy", forceinline=True)  # type: ignore[untyped-decorator]
     def model_view(m):  # type: ignore[no-untyped-def]
         return ModelView(
             _load(m + om.timestep, types.float64),
@@ -117,7 +117,7 @@ def callbacks() -> tuple[Any, Any]:
             _rows(m + om.sensor_user, _load(m + nuser_sensor, types.int64)),
         )
 
-    @njit  # type: ignore[untyped-decorator]
+    @njit(error_model="numpy", forceinline=True)  # type: ignore[untyped-decorator]
     def data_view(d):  # type: ignore[no-untyped-def]
         count = _load(d + ncon, types.int32)
         first = _load(d + contact, types.int64)
@@ -143,13 +143,13 @@ def callbacks() -> tuple[Any, Any]:
             ints[:, od.contact_efc_address // 4],
         )
 
-    @cfunc(types.float64(types.int64, types.int64, types.int32), cache=True)  # type: ignore[untyped-decorator]
+    @cfunc(types.float64(types.int64, types.int64, types.int32), cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
     def act_dyn(m, d, actuator):  # type: ignore[no-untyped-def]
         _ = sources
         wheel.act_dyn(model_view(m), data_view(d), actuator)
         return 0.0
 
-    @cfunc(types.void(types.int64, types.int64, types.int32), cache=True)  # type: ignore[untyped-decorator]
+    @cfunc(types.void(types.int64, types.int64, types.int32), cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
     def sensor(m, d, stage):  # type: ignore[no-untyped-def]
         _ = sources
         if stage == STAGE_ACC:

@@ -55,9 +55,7 @@ class DataView(NamedTuple):
 
 def model_view(model: mujoco.MjModel) -> ModelView:
     """The view of a model through the bindings."""
-    return ModelView(
-        model.opt.timestep, *(getattr(model, name) for name in ModelView._fields[1:])
-    )
+    return ModelView(model.opt.timestep, *(getattr(model, name) for name in ModelView._fields[1:]))
 
 
 def data_view(data: mujoco.MjData) -> DataView:

@@ -2,7 +2,10 @@
 
 Plain Python that Numba compiles, on the views of mjchair.engine.views. The tire's state lies in
 the activation of the wheel's `user` actuator: longitudinal, lateral and rolling deflection (m) and
-the load of the last solve (N). The callbacks run in this order within a step:
+the load of the last solve (N). They are inlined by force: a call hands over
+some 200 words of array descriptions, which costs three times what the wheel itself does.
+
+The callbacks run in this order within a step:
 
 1. `act_dyn`, before the constraint solve: deflections first, then the force, into `xfrc_applied`.
    `efc_force` is old memory at this point, so the load is the state's.
@@ -35,13 +38,16 @@ SENSOR_BIAS = 2
 PLAIN, HEADING = range(2)
 
 
-@register_jitable
-def dot(a, ax, ay, az):
-    """Scalar product of the three numbers from a[0] with a vector."""
-    return a[0] * ax + a[1] * ay + a[2] * az
+@register_jitable(forceinline=True)
+def dot(rows, row, column, ax, ay, az):
+    """Scalar product of three numbers of a row, from `column` on, with a vector.
+
+    Rows are read by index and never taken as a view: compiled views cost more than the product.
+    """
+    return rows[row, column] * ax + rows[row, column + 1] * ay + rows[row, column + 2] * az
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def tire_geom(m, actuator):
     """The tire geom that the actuator is the state of, or -1."""
     if m.actuator_dyntype[actuator] != DYN_USER or m.actuator_trntype[actuator] != TRN_JOINT:
@@ -56,7 +62,7 @@ def tire_geom(m, actuator):
     return -1
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def contact_patch(d, geom):
     """Where and how the ground touches the geom: its contacts as one, weighted by depth.
 
@@ -93,7 +99,7 @@ def contact_patch(d, geom):
     return weight, nx / size, ny / size, nz / size, px / weight, py / weight, pz / weight, ground
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def contact_load(d, geom, nx, ny, nz):
     """Solved load (N) of the geom's contacts along the normal; valid after the solve only."""
     load = 0.0
@@ -102,13 +108,13 @@ def contact_load(d, geom, nx, ny, nz):
         if address < 0:
             continue
         if d.contact_geom[c, 0] == geom:
-            load -= d.efc_force[address] * dot(d.contact_frame[c], nx, ny, nz)
+            load -= d.efc_force[address] * dot(d.contact_frame, c, 0, nx, ny, nz)
         elif d.contact_geom[c, 1] == geom:
-            load += d.efc_force[address] * dot(d.contact_frame[c], nx, ny, nz)
+            load += d.efc_force[address] * dot(d.contact_frame, c, 0, nx, ny, nz)
     return max(load, 0.0)
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def wheel_axes(d, geom, nx, ny, nz):
     """Heading x and left y in the ground plane, and camber (rad), from the spin axis.
 
@@ -116,69 +122,73 @@ def wheel_axes(d, geom, nx, ny, nz):
       x (3), y (3), gamma, spin axis (3). Where the axis is upright, the heading is undefined and
       the wheel's own x is taken.
     """
-    mat = d.geom_xmat[geom]
-    ax, ay, az = mat[2], mat[5], mat[8]
+    mat = d.geom_xmat
+    ax, ay, az = mat[geom, 2], mat[geom, 5], mat[geom, 8]
     hx, hy, hz = ay * nz - az * ny, az * nx - ax * nz, ax * ny - ay * nx
     size = math.sqrt(hx * hx + hy * hy + hz * hz)
     if size < 1e-9:
-        hx, hy, hz, size = mat[0], mat[3], mat[6], 1.0
+        hx, hy, hz, size = mat[geom, 0], mat[geom, 3], mat[geom, 6], 1.0
     hx, hy, hz = hx / size, hy / size, hz / size
     lx, ly, lz = ny * hz - nz * hy, nz * hx - nx * hz, nx * hy - ny * hx
     gamma = math.asin(min(max(ax * nx + ay * ny + az * nz, -1.0), 1.0))
     return hx, hy, hz, lx, ly, lz, gamma, ax, ay, az
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def velocity_at(m, d, body, px, py, pz):
     """Velocity (m/s) of the point of the body that is at p, and the body's spin (rad/s)."""
-    com = d.subtree_com[m.body_rootid[body]]
-    cvel = d.cvel[body]
-    rx, ry, rz = px - com[0], py - com[1], pz - com[2]
-    wx, wy, wz = cvel[0], cvel[1], cvel[2]
-    vx = cvel[3] + wy * rz - wz * ry
-    vy = cvel[4] + wz * rx - wx * rz
-    vz = cvel[5] + wx * ry - wy * rx
+    com, root, cvel = d.subtree_com, m.body_rootid[body], d.cvel
+    rx, ry, rz = px - com[root, 0], py - com[root, 1], pz - com[root, 2]
+    wx, wy, wz = cvel[body, 0], cvel[body, 1], cvel[body, 2]
+    vx = cvel[body, 3] + wy * rz - wz * ry
+    vy = cvel[body, 4] + wz * rx - wx * rz
+    vz = cvel[body, 5] + wx * ry - wy * rx
     return vx, vy, vz, wx, wy, wz
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def ground_velocity(m, d, geom, px, py, pz):
     """Velocity (m/s) of the ground at p, with its surface velocity (a treadmill), and its spin."""
     vx, vy, vz, wx, wy, wz = velocity_at(m, d, m.geom_bodyid[geom], px, py, pz)
-    s = m.geom_surfacevel[geom]
-    if s[0] == 0.0 and s[1] == 0.0 and s[2] == 0.0 and s[3] == 0.0 and s[4] == 0.0 and s[5] == 0.0:
+    s = m.geom_surfacevel
+    moving = False
+    for i in range(6):
+        moving = moving or s[geom, i] != 0.0
+    if not moving:
         return vx, vy, vz, wx, wy, wz
-    mat, pos = d.geom_xmat[geom], d.geom_xpos[geom]
-    rx, ry, rz = px - pos[0], py - pos[1], pz - pos[2]
-    bx = mat[0] * s[3] + mat[1] * s[4] + mat[2] * s[5]
-    by = mat[3] * s[3] + mat[4] * s[4] + mat[5] * s[5]
-    bz = mat[6] * s[3] + mat[7] * s[4] + mat[8] * s[5]
-    vx += mat[0] * s[0] + mat[1] * s[1] + mat[2] * s[2] + by * rz - bz * ry
-    vy += mat[3] * s[0] + mat[4] * s[1] + mat[5] * s[2] + bz * rx - bx * rz
-    vz += mat[6] * s[0] + mat[7] * s[1] + mat[8] * s[2] + bx * ry - by * rx
+    mat, pos = d.geom_xmat, d.geom_xpos
+    rx, ry, rz = px - pos[geom, 0], py - pos[geom, 1], pz - pos[geom, 2]
+    ux, uy, uz = s[geom, 0], s[geom, 1], s[geom, 2]
+    tx, ty, tz = s[geom, 3], s[geom, 4], s[geom, 5]
+    bx = dot(mat, geom, 0, tx, ty, tz)
+    by = dot(mat, geom, 3, tx, ty, tz)
+    bz = dot(mat, geom, 6, tx, ty, tz)
+    vx += dot(mat, geom, 0, ux, uy, uz) + by * rz - bz * ry
+    vy += dot(mat, geom, 3, ux, uy, uz) + bz * rx - bx * rz
+    vz += dot(mat, geom, 6, ux, uy, uz) + bx * ry - by * rx
     return vx, vy, vz, wx + bx, wy + by, wz + bz
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def road(m, ground, px, py):
     """Added rolling resistance and friction factor of the ground geom's patches at p.
 
     A patch fades over the outer tenth of its radius.
     """
     added, friction = 0.0, 1.0
-    user = m.geom_user[ground]
-    if user[0] != block.ROAD_TAG:
+    user = m.geom_user
+    if user[ground, 0] != block.ROAD_TAG:
         return added, friction
-    for k in range(int(user[block.ROAD_COUNT])):
+    for k in range(int(user[ground, block.ROAD_COUNT])):
         at = block.ROAD_PATCHES + k * block.ROAD_STRIDE
-        distance = math.hypot(px - user[at], py - user[at + 1]) / user[at + 2]
-        inside = min(max((1.0 - distance) * 10.0, 0.0), 1.0)
-        added += inside * user[at + 3]
-        friction *= 1.0 + inside * (user[at + 4] - 1.0)
+        distance = math.hypot(px - user[ground, at], py - user[ground, at + 1])
+        inside = min(max((1.0 - distance / user[ground, at + 2]) * 10.0, 0.0), 1.0)
+        added += inside * user[ground, at + 3]
+        friction *= 1.0 + inside * (user[ground, at + 4] - 1.0)
     return added, friction
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def act_dyn(m, d, actuator):
     """Step the deflections of one wheel and put its tire force into `xfrc_applied`."""
     geom = tire_geom(m, actuator)
@@ -189,19 +199,19 @@ def act_dyn(m, d, actuator):
     h = m.timestep
     weight, nx, ny, nz, px, py, pz, ground = contact_patch(d, geom)
     u, w, r, load = d.act[at], d.act[at + 1], d.act[at + 2], d.act[at + 3]
-    force = d.xfrc_applied[body]
+    force = d.xfrc_applied
     if weight == 0.0 or load <= 0.0:
         d.act_dot[at], d.act_dot[at + 1], d.act_dot[at + 2] = -u / h, -w / h, -r / h
         for i in range(6):
-            force[i] = 0.0
+            force[body, i] = 0.0
         return
 
     hx, hy, hz, lx, ly, lz, gamma, ax, ay, az = wheel_axes(d, geom, nx, ny, nz)
     vx, vy, vz, wx, wy, wz = velocity_at(m, d, body, px, py, pz)
     gx, gy, gz, ox, oy, oz = ground_velocity(m, d, ground, px, py, pz)
     vx, vy, vz, wx, wy, wz = vx - gx, vy - gy, vz - gz, wx - ox, wy - oy, wz - oz
-    center = d.geom_xpos[geom]
-    cx, cy, cz = center[0] - px, center[1] - py, center[2] - pz
+    center = d.geom_xpos
+    cx, cy, cz = center[geom, 0] - px, center[geom, 1] - py, center[geom, 2] - pz
     # the arm on which spin moves the contact along the heading: (axis x centre) . heading
     radius = hx * (ay * cz - az * cy) + hy * (az * cx - ax * cz) + hz * (ax * cy - ay * cx)
     slip_x = vx * hx + vy * hy + vz * hz
@@ -231,16 +241,16 @@ def act_dyn(m, d, actuator):
     d.act_dot[at + 1] = (new_w - w) / h
     d.act_dot[at + 2] = (new_r - r) / h
 
-    com = d.xipos[body]
-    rx, ry, rz = px - com[0], py - com[1], pz - com[2]
+    com = d.xipos
+    rx, ry, rz = px - com[body, 0], py - com[body, 1], pz - com[body, 2]
     tx, ty, tz = fx * hx + fy * lx, fx * hy + fy * ly, fx * hz + fy * lz
-    force[0], force[1], force[2] = tx, ty, tz
-    force[3] = ry * tz - rz * ty + mx * hx + my * lx + mz * nx
-    force[4] = rz * tx - rx * tz + mx * hy + my * ly + mz * ny
-    force[5] = rx * ty - ry * tx + mx * hz + my * lz + mz * nz
+    force[body, 0], force[body, 1], force[body, 2] = tx, ty, tz
+    force[body, 3] = ry * tz - rz * ty + mx * hx + my * lx + mz * nx
+    force[body, 4] = rz * tx - rx * tz + mx * hy + my * ly + mz * ny
+    force[body, 5] = rx * ty - ry * tx + mx * hz + my * lz + mz * nz
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def sense_tire(m, d, actuator, geom, adr):
     """Put the solved load into the state, and fill Fx, Fy, Fz, Mz, kappa, tan_alpha, gamma."""
     at = m.actuator_actadr[actuator]
@@ -249,31 +259,29 @@ def sense_tire(m, d, actuator, geom, adr):
     load = contact_load(d, geom, nx, ny, nz) if ground >= 0 else 0.0
     last = d.act[at + 3]
     d.act_dot[at + 3] = (load - last) / h
-    out = d.sensordata[adr : adr + 7]
+    out = d.sensordata
     for i in range(7):
-        out[i] = 0.0
+        out[adr + i] = 0.0
     if ground < 0:
         return
     body = m.geom_bodyid[geom]
     hx, hy, hz, lx, ly, lz, gamma, _, _, _ = wheel_axes(d, geom, nx, ny, nz)
-    force, com = d.xfrc_applied[body], d.xipos[body]
-    rx, ry, rz = px - com[0], py - com[1], pz - com[2]
-    out[0] = dot(force, hx, hy, hz)
-    out[1] = dot(force, lx, ly, lz)
-    out[2] = load
-    out[3] = (
-        dot(force[3:6], nx, ny, nz)
-        - (ry * force[2] - rz * force[1]) * nx
-        - (rz * force[0] - rx * force[2]) * ny
-        - (rx * force[1] - ry * force[0]) * nz
+    force, com = d.xfrc_applied, d.xipos
+    rx, ry, rz = px - com[body, 0], py - com[body, 1], pz - com[body, 2]
+    tx, ty, tz = force[body, 0], force[body, 1], force[body, 2]
+    out[adr] = tx * hx + ty * hy + tz * hz
+    out[adr + 1] = tx * lx + ty * ly + tz * lz
+    out[adr + 2] = load
+    out[adr + 3] = dot(force, body, 3, nx, ny, nz) - (
+        (ry * tz - rz * ty) * nx + (rz * tx - rx * tz) * ny + (rx * ty - ry * tx) * nz
     )
     sigma_x, sigma_y = law.relaxation(m.geom_user[geom], last, gamma)
-    out[4] = -(d.act[at] + h * d.act_dot[at]) / sigma_x
-    out[5] = (d.act[at + 1] + h * d.act_dot[at + 1]) / sigma_y
-    out[6] = gamma
+    out[adr + 4] = -(d.act[at] + h * d.act_dot[at]) / sigma_x
+    out[adr + 5] = (d.act[at + 1] + h * d.act_dot[at + 1]) / sigma_y
+    out[adr + 6] = gamma
 
 
-@register_jitable
+@register_jitable(forceinline=True)
 def sense(m, d):
     """Fill mjchair's sensors and apply the sensor blocks; for the acceleration stage."""
     for i in range(m.nsensor):
@@ -284,11 +292,13 @@ def sense(m, d):
                 sense_tire(m, d, m.sensor_objid[i], geom, adr)
         if m.sensor_user.shape[1] <= SENSOR_KIND or m.sensor_user[i, 0] != SENSOR_TAG:
             continue
-        user = m.sensor_user[i]
-        if user[SENSOR_KIND] == HEADING:
-            mat = d.site_xmat[m.sensor_objid[i]]
-            d.sensordata[adr] = math.atan2(mat[3], mat[0])
+        user = m.sensor_user
+        if user[i, SENSOR_KIND] == HEADING:
+            site = m.sensor_objid[i]
+            d.sensordata[adr] = math.atan2(d.site_xmat[site, 3], d.site_xmat[site, 0])
         for k in range(m.sensor_dim[i]):
             at = SENSOR_BIAS + 2 * k
-            if at + 1 < user.shape[0]:
-                d.sensordata[adr + k] = user[at] + (1.0 + user[at + 1]) * d.sensordata[adr + k]
+            if at + 1 < user.shape[1]:
+                d.sensordata[adr + k] = (
+                    user[i, at] + (1.0 + user[i, at + 1]) * d.sensordata[adr + k]
+                )

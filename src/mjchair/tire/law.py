@@ -14,6 +14,8 @@ from mjchair.tire import block
 from mjchair.tire.formula import linear, mf61, pac89
 from mjchair.tire.transient import relax
 
+TURNING_RATE = 0.05  # rad/s, over which the turning moment's sign is smoothed; assumed
+
 pac89_forces, pac89_stiffness = pac89.forces, pac89.stiffness
 linear_forces, linear_stiffness = linear.forces, linear.stiffness
 mf_forces, mf_stiffness, mf_relaxation = mf61.forces, mf61.stiffness, mf61.relaxation
@@ -167,7 +169,8 @@ def step_tire(p, u, w, r, fz, gamma, vx, vsx, vsy, spin, yaw_rate, radius, added
         p, fz, kappa, tan_alpha, gamma, vx, direction, braked, radius, friction
     )
     my -= added * fz * radius * braked
-    mz -= p[block.TURNING_MOMENT] * math.tanh(yaw_rate / 0.05)
+    if p[block.TURNING_MOMENT] != 0.0:
+        mz -= p[block.TURNING_MOMENT] * math.tanh(yaw_rate / TURNING_RATE)
 
     damping = p[block.DAMPING_TIME] / h
     total_x = fx - damping * c_kappa / sigma_x * (new_u - u)

@@ -1,12 +1,12 @@
 """This project's tire file: TOML with the fields of a Tire and its coefficients by name.
 
-    name = "wheelchair"
-    family = "pac89"
-    load_unit = "N"          # of the lists, PAC89 only: "N" or "kN"
-    relaxation_x = 0.04      # m; any number of Tire
+name = "wheelchair"
+family = "pac89"
+load_unit = "N"          # of the lists, PAC89 only: "N" or "kN"
+relaxation_x = 0.04      # m; any number of Tire
 
-    [coefficients]
-    a = [1.3, 0.0, 0.8]      # PAC89: the lists as published; other families by name
+[coefficients]
+a = [1.3, 0.0, 0.8]      # PAC89: the lists as published; other families by name
 """
 
 from __future__ import annotations

@@ -1,0 +1,176 @@
+"""The tire elements of a model or a specification, and whether they are whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.errors import MjchairError
+from mjchair.tire import block, law
+
+WHEELS = ("left_wheel", "right_wheel", "left_caster", "right_caster")
+SUFFIX = "_tire"
+
+
+def base_name(name: str) -> str:
+    """A name without the prefixes that attachments gave it."""
+    return name.rsplit("/", 1)[-1]
+
+
+def plain_name(name: str, known: tuple[str, ...]) -> str:
+    """The one of the `known` names that `name` ends in, behind any prefix, or an empty string."""
+    ends = [k for k in known if name == k or name.endswith(k)]
+    return max(ends, key=len) if ends else ""
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """One wheel of a compiled model.
+
+    Attributes:
+      name: of the wheel's joint. geom, body, joint, actuator: ids.
+      block: the tire's numbers, a view into geom_user.
+    """
+
+    name: str
+    geom: int
+    body: int
+    joint: int
+    actuator: int
+    block: NDArray[np.float64]
+
+
+def wheels(model: mujoco.MjModel) -> list[Wheel]:
+    """The wheels of a compiled model: every tire state actuator with its tire geom."""
+    found = []
+    for actuator in range(model.nactuator):
+        if (
+            model.actuator_dyntype[actuator] != mujoco.mjtDyn.mjDYN_USER
+            or model.actuator_trntype[actuator] != mujoco.mjtTrn.mjTRN_JOINT
+        ):
+            continue
+        joint = int(model.actuator_trnid[actuator, 0])
+        body = int(model.jnt_bodyid[joint])
+        first = int(model.body_geomadr[body])
+        for geom in range(first, first + int(model.body_geomnum[body])):
+            if _tagged(model, geom):
+                name = model.joint(joint).name
+                found.append(Wheel(name, geom, body, joint, actuator, model.geom_user[geom]))
+                break
+    return found
+
+
+def _tagged(model: mujoco.MjModel, geom: int) -> bool:
+    user = model.geom_user
+    return bool(user.shape[1] >= block.HEADER and user[geom, block.TAG_AT] == block.TAG)
+
+
+def check(model: mujoco.MjModel) -> None:
+    """See that every wheel carries a whole tire, and that the time step suits it.
+
+    Raises:
+      MjchairError: a joint named as a wheel has no tire; a tire geom makes friction of its own
+        (condim above 1), has no state actuator, or a block of another version; the time step is
+        beyond the stability limit of a tire.
+    """
+    found = wheels(model)
+    have = {wheel.joint for wheel in found}
+    for joint in range(model.njnt):
+        name = model.joint(joint).name
+        if plain_name(base_name(name), WHEELS) and joint not in have:
+            raise MjchairError(
+                f"wheel {name!r} has no tire: its body needs a geom named {name + SUFFIX!r} with "
+                "a tire block, and a user actuator of that name with actdim 4"
+            )
+    geoms = {wheel.geom for wheel in found}
+    for geom in range(model.ngeom):
+        if _tagged(model, geom) and geom not in geoms:
+            raise MjchairError(
+                f"tire geom {model.geom(geom).name!r} has no state: add a user actuator with "
+                "actdim 4 on its wheel's joint"
+            )
+    for wheel in found:
+        name = model.geom(wheel.geom).name
+        if model.geom_condim[wheel.geom] != 1:
+            raise MjchairError(
+                f"tire geom {name!r} has condim {model.geom_condim[wheel.geom]}; it must be 1, "
+                "since the tire makes the friction"
+            )
+        if wheel.block[block.VERSION_AT] != block.VERSION:
+            raise MjchairError(
+                f"tire geom {name!r} has a block of version {wheel.block[block.VERSION_AT]:g}; "
+                f"this mjchair reads version {block.VERSION:g}: make the model anew"
+            )
+    check_timestep(model, found)
+
+
+def check_timestep(model: mujoco.MjModel, found: list[Wheel] | None = None) -> None:
+    """Hold the time step h against k h^2 / m + 2 c h / m < 4 for every tire.
+
+    Along and across the heading k = C / sigma is the carcass stiffness at the nominal load, c its
+    damping, and m the mass that the contact point moves against in the model's initial pose,
+    without the ground under it. About the axle k and c are those of the rolling moment, and m is
+    the inertia that the wheel turns against.
+
+    Raises:
+      MjchairError: the limit is passed; the message gives the largest step that is not.
+    """
+    h = model.opt.timestep
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_crb(model, data)
+    mujoco.mj_factorM(model, data)
+    for wheel in wheels(model) if found is None else found:
+        inertia = contact_inertia(model, data, wheel)
+        for (axis, k, c), m in zip(_springs(model, wheel), inertia, strict=True):
+            if k * h * h / m + 2.0 * c * h / m < 4.0:
+                continue
+            most = (np.sqrt(c**2 + 4.0 * k * m) - c) / k
+            raise MjchairError(
+                f"timestep {h:g} s is beyond the stability limit of {wheel.name}'s tire {axis}; "
+                f"use at most {0.9 * most:.2g} s, or a tire with longer relaxation or less damping"
+            )
+
+
+def _springs(model: mujoco.MjModel, wheel: Wheel) -> list[tuple[str, float, float]]:
+    """Stiffness and damping along (N/m), across (N/m) and about the axle (N m/rad) of a tire."""
+    tire = wheel.block
+    load = tire[block.NOMINAL_LOAD]
+    radius = model.geom_size[wheel.geom, 0]
+    c_kappa, c_alpha, _, _ = law.family_stiffness(tire, load, 0.0, 0.0)
+    sigma_x, sigma_y = law.family_relaxation(tire, load, c_kappa, c_alpha)
+    slope = law.factors(tire, load)[1]
+    rolling = tire[block.ROLLING_RESISTANCE] * load * radius**2 / tire[block.ROLLING_RELAXATION]
+    stiffness = (slope * c_kappa / sigma_x, slope * c_alpha / sigma_y, rolling)
+    times = [tire[i] for i in (block.DAMPING_TIME, block.DAMPING_TIME, block.ROLLING_DAMPING_TIME)]
+    axes = ("along", "across", "about its axle")
+    return [(axis, k, k * time) for axis, k, time in zip(axes, stiffness, times, strict=True)]
+
+
+def contact_inertia(
+    model: mujoco.MjModel, data: mujoco.MjData, wheel: Wheel
+) -> tuple[float, float, float]:
+    """What a force at the contact moves: mass (kg) along the heading and across it, and inertia
+    (kg m^2) about the axle.
+
+    Args:
+      data: with positions and the factorised inertia matrix.
+    """
+    axis = data.geom_xmat[wheel.geom].reshape(3, 3)[:, 2]
+    up = np.array([0.0, 0.0, 1.0])
+    heading = np.cross(axis, up)
+    heading /= np.linalg.norm(heading)
+    left = np.cross(up, heading)
+    point = data.geom_xpos[wheel.geom] - up * model.geom_size[wheel.geom, 0]
+    jacobian = np.zeros((3, model.nv))
+    mujoco.mj_jac(model, data, jacobian, None, point, wheel.body)
+    rows = np.vstack([[heading, left] @ jacobian, np.zeros(model.nv)])
+    rows[2, model.jnt_dofadr[wheel.joint]] = 1.0
+    solved = np.zeros_like(rows)
+    mujoco.mj_solveM(model, data, solved, rows)
+    along, across, about = 1.0 / (rows * solved).sum(axis=1)
+    return along, across, about
