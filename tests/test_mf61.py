@@ -171,6 +171,15 @@ def test_a_given_relaxation_length_goes_before_the_files():
     assert y == pytest.approx(0.5 * BOOK_RADIUS)  # no stiffness in the file: the assumption
 
 
+def test_moments_are_scaled_to_the_wheel_that_carries_the_tire():
+    block = tire().block()
+    own = law.family_forces(block, 3000.0, 0.01, 0.1, 0.02, 10.0, 1.0)
+    block[law.block.RADIUS] = BOOK_RADIUS / 4
+    small = law.family_forces(block, 3000.0, 0.01, 0.1, 0.02, 10.0, 1.0)
+    assert small[:2] == own[:2]
+    assert np.allclose(small[2:], np.array(own[2:]) / 4)
+
+
 def test_a_file_without_its_scale_is_refused():
     numbers = book()
     del numbers["FNOMIN"]

@@ -110,8 +110,8 @@ def check(model: mujoco.MjModel) -> None:
 def check_timestep(model: mujoco.MjModel, found: list[Wheel] | None = None) -> None:
     """Hold the time step h against k h^2 / m + 2 c h / m < 4 for every tire.
 
-    Along and across the heading k = C / sigma is the carcass stiffness at the nominal load, c its
-    damping, and m the mass that the contact point moves against in the model's initial pose,
+    Along and across the heading k = C / sigma is the carcass stiffness at the nominal load, or
+    at half the weight of the model where that is less, c its damping, and m the mass that the contact point moves against in the model's initial pose,
     without the ground under it. About the axle k and c are those of the rolling moment, and m is
     the inertia that the wheel turns against.
 
@@ -139,7 +139,8 @@ def check_timestep(model: mujoco.MjModel, found: list[Wheel] | None = None) -> N
 def _springs(model: mujoco.MjModel, wheel: Wheel) -> list[tuple[str, float, float]]:
     """Stiffness and damping along (N/m), across (N/m) and about the axle (N m/rad) of a tire."""
     tire = wheel.block
-    load = tire[block.NOMINAL_LOAD]
+    weight = model.body_subtreemass[0] * np.linalg.norm(model.opt.gravity)
+    load = min(tire[block.NOMINAL_LOAD], 0.5 * weight)  # a car's tire carries no car here
     radius = model.geom_size[wheel.geom, 0]
     c_kappa, c_alpha, _, _ = law.family_stiffness(tire, load, 0.0, 0.0)
     sigma_x, sigma_y = law.family_relaxation(tire, load, c_kappa, c_alpha)

@@ -81,7 +81,7 @@ class Tire:
         0.0, "m", 0.0, 0.5, "at zero slip, where the family has no aligning moment of its own"
     )
     slide_speed: float = quantity(0.05, "m/s", 1e-4, 10.0, "slip speed of sliding at standstill")
-    radius: float = quantity(0.3, "m", 0.01, 2.0, "unloaded radius of the tire as measured")
+    radius: float = quantity(0.3, "m", 0.01, 2.0, "unloaded radius; UNLOADED_RADIUS where given")
 
     def __post_init__(self) -> None:
         """Freeze the coefficients and check every number."""
@@ -104,6 +104,8 @@ class Tire:
             "coefficients",
             MappingProxyType({k: float(v) for k, v in self.coefficients.items()}),
         )
+        if self.coefficients.get("UNLOADED_RADIUS"):
+            object.__setattr__(self, "radius", self.coefficients["UNLOADED_RADIUS"])
         object.__setattr__(self, "unused", MappingProxyType(dict(self.unused)))
         for item in fields(self):
             if not item.metadata:

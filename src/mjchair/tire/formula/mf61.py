@@ -13,6 +13,8 @@ What is done beyond the equations, and why:
   equations are simply used: they vanish with the load. Curvature factors stay at 1 or less, and
   peaks and stiffnesses keep their sign.
 - A file without coefficients of combined slip has its forces held to the friction ellipse.
+- Every moment of the formula is in proportion to the radius, so on a wheel of another radius than
+  the file's they are scaled to it.
 - There is no low-speed branch: the tire's deflections carry standstill. Instead the shifts that
   come of ply steer and rolling (SHx, SVx, SHy, SVy without camber) follow the direction of
   rolling, which passes through 0 smoothly at standstill; camber thrust does not turn with it.
@@ -25,7 +27,7 @@ import math
 
 from numba.extending import register_jitable
 
-from mjchair.tire.block import FAMILY, MF52
+from mjchair.tire.block import FAMILY, MF52, RADIUS
 from mjchair.tire.formula.mf_fold import AT
 
 SHORTEST = 0.1  # of the radius: a shorter relaxation length would be too stiff for a light wheel
@@ -295,7 +297,9 @@ def forces(p, fz, kappa, tan_alpha, gamma, speed, direction):
     mz += residual_mz(p, fz, dfz, slip, camber, kya, sh, sv, stretch)
     arm = p[AT.S1] + p[AT.S2] * fy + (p[AT.S3] + p[AT.S4] * dfz) * gamma
     mz = mz * cosine * direction + arm * fx
-    return fx, fy, overturning(p, fz, fy, gamma), rolling(p, fz, fx, gamma, speed), mz
+    mx, my = overturning(p, fz, fy, gamma), rolling(p, fz, fx, gamma, speed)
+    size = p[RADIUS] / p[AT.R0]
+    return fx, fy, size * mx, size * my, size * mz
 
 
 @register_jitable
