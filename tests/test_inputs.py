@@ -119,7 +119,7 @@ def test_inputs_are_frozen():
         ("t,left_wheel\n0,1\n", "the first column is 't'; it must be time"),
         ("time,left_wheel,left_wheel\n0,1,2\n", "'left_wheel' is there twice"),
         ("time,left_whel\n0,1\n", "unknown channel 'left_whel'; did you mean 'left_wheel'?"),
-        ("time,left_wheel [Nmm]\n0,1\n", "unknown unit 'Nmm'; did you mean 'N"),
+        ("time,left_wheel [Nmm]\n0,1\n", "unknown unit 'Nmm'; did you mean"),
         ("time,left_wheel_speed\n0,1\n", "no column drives an actuator"),
         ("time,left_wheel_tire\n0,1\n", "unknown channel 'left_wheel_tire'"),
         ("time,left_wheel\n", "no samples"),
@@ -141,9 +141,9 @@ def test_a_missing_file_names_its_neighbour(tmp_path, model):
 
 
 def test_other_suffixes_and_broken_parquet_are_refused(tmp_path, model):
-    with pytest.raises(MjchairError, match="ends in .csv or .parquet"):
+    with pytest.raises(MjchairError, match=r"ends in \.csv or \.parquet"):
         read_inputs(write(tmp_path / "a.txt", "time\n"), model)
-    with pytest.raises(MjchairError, match="cannot read .* as Parquet"):
+    with pytest.raises(MjchairError, match=r"cannot read .* as Parquet"):
         read_inputs(write(tmp_path / "a.parquet", "time\n"), model)
 
 

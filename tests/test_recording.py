@@ -111,7 +111,7 @@ def test_other_npz_files_and_missing_ones_are_refused(tmp_path):
 
 
 def test_a_failed_save_leaves_nothing(tmp_path):
-    with pytest.raises(MjchairError, match="saved as .npz"):
+    with pytest.raises(MjchairError, match=r"saved as \.npz"):
         recording().save(tmp_path / "run.pkl")
     with pytest.raises(MjchairError, match="cannot write"):
         recording().save(tmp_path / "nowhere" / "run.npz")

@@ -181,8 +181,8 @@ def _good(model: mujoco.MjModel, states: Array, sensed: Array, first: int) -> tu
     """
     clock = (first + 1 + np.arange(len(states))) * model.opt.timestep
     qvel = states[:, 1 + model.nq : 1 + model.nq + model.nv]
-    sense_finite: NDArray[np.bool_] = np.isfinite(sensed).all(axis=1)
-    finite = np.isfinite(states).all(axis=1) & sense_finite
+    sense_finite = np.logical_and.reduce(np.isfinite(sensed), axis=1)
+    finite = np.logical_and.reduce(np.isfinite(states), axis=1) & sense_finite
     in_time = np.abs(states[:, 0] - clock) < 0.5 * model.opt.timestep
     slow = (np.abs(np.nan_to_num(qvel, nan=np.inf)) < TOO_FAST).all(axis=1)
     bad = np.flatnonzero(np.logical_not(finite & in_time & slow))
