@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from mjchair.errors import MjchairError, nearest
-from mjchair.simulation import names
+from mjchair.model.wheels import base_name
 from mjchair.simulation.channels import channels
 from mjchair.simulation.inputs import OTHER_COLUMNS, Inputs, drivable
 from mjchair.simulation.table import Array, Table, read_table
@@ -67,8 +67,8 @@ def read_trial(path: str | os.PathLike[str], model: mujoco.MjModel) -> Trial:
 
 def trial_from_table(table: Table, model: mujoco.MjModel, name: str) -> Trial:
     """A trial of a table; see `read_trial`."""
-    sensed = {names.short(c.name) for c in channels(model)} | {c.name for c in channels(model)}
-    driven = {names.short(a) for a in drivable(model)} | set(drivable(model))
+    sensed = {base_name(c.name) for c in channels(model)} | {c.name for c in channels(model)}
+    driven = {base_name(a) for a in drivable(model)} | set(drivable(model))
     measured, controls, other = {}, {}, {}
     for column, values in table.columns.items():
         if column in driven:

@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
 from mjchair.errors import MjchairError
 from mjchair.report.forces import COLOURS, Array, peak, round_up, wheel_forces
@@ -88,7 +89,8 @@ def trajectory(
     """The path of the chair from above, with the forces of every tire in their true directions.
 
     Lateral forces are green, longitudinal ones orange, on one scale; each arrow starts at its
-    tire's contact. The load points at the reader, so it is not drawn.
+    tire's contact. The load points at the reader, so it is not drawn, and neither are arrows too
+    short to have a direction.
 
     Args:
       recording: what was simulated.
@@ -96,8 +98,10 @@ def trajectory(
       arrows: places along the path at which forces are drawn.
       load: write each wheel's load (N) beside its contact.
     """
-    figure, axes = plt.subplots(figsize=(9.0, 5.6), layout="constrained")
     path = recording.vector("position")
+    wide, high = np.ptp(path[:, :2], axis=0) + 1.5  # m, with the chair about the path
+    height = float(np.clip(8.0 * high / wide + 1.6, 4.0, 8.0))
+    figure, axes = plt.subplots(figsize=(9.0, height), layout="constrained")
     axes.plot(path[:, 0], path[:, 1], color="#555555", lw=1.2, label="middle of the rear axle")
     unit = _newtons_a_metre(recording, path)
     model = recording.model.load()
@@ -105,7 +109,7 @@ def trajectory(
     for sample in _places(recording, path, arrows):
         data.qpos[:] = recording.qpos[sample]
         mujoco.mj_kinematics(model, data)
-        _draw_sample(axes, model, data, recording, sample, unit, load)
+        _draw_sample(axes, model, data, recording, sample, unit, load, max(wide, high) / 80.0)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
@@ -140,14 +144,17 @@ def _draw_sample(
     sample: int,
     unit: float,
     load: bool,
+    shortest: float,
 ) -> None:
     for wheel in wheel_forces(model, data, recording, sample):
         x, y = wheel.contact[:2]
-        forward = np.array([-wheel.left[1], wheel.left[0]]) * -1.0
+        forward = np.array([wheel.left[1], -wheel.left[0]])
         half = 0.5 * model.geom_size[model.geom(f"{wheel.wheel}_tire").id, 0] * forward
         axes.plot([x - half[0], x + half[0]], [y - half[1], y + half[1]], color="#999999", lw=2.2)
         for component in HORIZONTAL:
             arrow = wheel.forces[component][:2] / unit
+            if np.linalg.norm(arrow) < shortest:
+                continue
             axes.annotate(
                 "",
                 (x + arrow[0], y + arrow[1]),
@@ -172,25 +179,17 @@ def _force_legend(axes: Axes, unit: float) -> None:
     entries.append(Line2D([], [], color="#999999", lw=2.2, label="wheel"))
     entries.append(Line2D([], [], color="#555555", lw=1.2, label="middle of the rear axle"))
     axes.legend(handles=entries, loc="upper left", frameon=True, fontsize=9)
-    _scale_arrow(axes, unit)
+    _scale_bar(axes, unit)
 
 
-def _scale_arrow(axes: Axes, unit: float) -> None:
-    """An arrow of a round force, drawn to the axes' own scale, with its number."""
+def _scale_bar(axes: Axes, unit: float) -> None:
+    """A bar of a round force, to the axes' own scale, with its number."""
     low, high = axes.get_xlim()
     force = round_up(unit * (high - low) / 14.0)
-    length = force / unit
-    bottom, top = axes.get_ylim()
-    axes.set_ylim(bottom - 0.16 * (top - bottom), top)
-    bottom, top = axes.get_ylim()
-    x, y = high - 0.03 * (high - low) - length, bottom + 0.06 * (top - bottom)
-    axes.annotate(
-        "",
-        (x + length, y),
-        (x, y),
-        arrowprops={"arrowstyle": "-|>", "color": "black", "lw": 1.6, "shrinkA": 0, "shrinkB": 0},
+    bar = AnchoredSizeBar(
+        axes.transData, force / unit, f"{force:g} N", "lower right", sep=5, frameon=False
     )
-    axes.text(x + 0.5 * length, y + 0.015 * (top - bottom), f"{force:g} N", ha="center")
+    axes.add_artist(bar)
 
 
 def _title(figure: Figure, axes: Axes, title: str, note: str) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import mujoco
 
+from mjchair.model.wheels import base_name
 from mjchair.simulation import names
 
 # components and units of the tire sensor, in the order of its dimensions
@@ -77,7 +78,7 @@ def _components(model: mujoco.MjModel, i: int, name: str) -> list[tuple[str, str
     if kind == _S.mjSENS_USER:
         if name.endswith("_tire") and dim == len(TIRE):
             return [("." + part, unit) for part, unit in TIRE]
-        return _vector(dim, _USER_UNITS.get(names.short(name), "?"))
+        return _vector(dim, _USER_UNITS.get(base_name(name), "?"))
     if kind in _JOINT_UNITS:
         hinge = model.jnt_type[model.sensor_objid[i]] == mujoco.mjtJoint.mjJNT_HINGE
         return _vector(dim, _JOINT_UNITS[kind][int(hinge)])

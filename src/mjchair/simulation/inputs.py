@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mjchair.errors import MjchairError, nearest
+from mjchair.model.wheels import base_name
 from mjchair.simulation import names
 from mjchair.simulation.table import Array, check_time, frozen, read_table
 
@@ -172,8 +173,8 @@ def read_inputs(path: str | os.PathLike[str], model: mujoco.MjModel) -> Inputs:
       MjchairError: a column that is neither, a table that drives nothing, or as read_table does.
     """
     table = read_table(path)
-    driven = {names.short(name) for name in drivable(model)} | set(drivable(model))
-    sensed = {names.short(name) for name in names.sensors(model)} | set(names.sensors(model))
+    driven = {base_name(name) for name in drivable(model)} | set(drivable(model))
+    sensed = {base_name(name) for name in names.sensors(model)} | set(names.sensors(model))
     controls = {}
     for name, values in table.columns.items():
         if name in driven:

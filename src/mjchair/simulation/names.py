@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import mujoco
 
 from mjchair.errors import MjchairError, nearest
+from mjchair.model.wheels import base_name
 
 
 def names(model: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> list[str]:
@@ -36,7 +37,7 @@ def geoms(model: mujoco.MjModel) -> list[str]:
 
 def same(full: str, name: str) -> bool:
     """Whether `full` is `name`, with or without a prefix that ends in "/"."""
-    return full == name or full.endswith("/" + name)
+    return name in (full, base_name(full))
 
 
 def find(name: str, known: Sequence[str], what: str) -> int:
@@ -54,8 +55,3 @@ def find(name: str, known: Sequence[str], what: str) -> int:
         full = ", ".join(known[i] for i in matches)
         raise MjchairError(f"{what} {name!r} fits several; give one of {full}")
     return matches[0]
-
-
-def short(name: str) -> str:
-    """The name without its prefix."""
-    return name.rsplit("/", 1)[-1]

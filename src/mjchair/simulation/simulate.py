@@ -16,6 +16,8 @@ from tqdm import tqdm
 
 from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
+from mjchair.model.spec import compile_spec
+from mjchair.model.wheels import check_timestep
 from mjchair.simulation import names
 from mjchair.simulation.channels import channels, control_unit
 from mjchair.simulation.initial import Initial, as_initial, lock_wheels, start
@@ -64,16 +66,17 @@ def simulate(
       progress: show a bar where standard error is a terminal.
 
     Raises:
-      MjchairError: bad input, as one line.
+      MjchairError: bad input, as one line; a timestep beyond the stability limit of a tire.
     """
     spec = None
     if isinstance(model, mujoco.MjSpec):
         spec = model.copy()
-        model = spec.compile()
+        model = compile_spec(spec)
     model = copy.copy(model)
     if timestep is not None:
         _check_positive("timestep", timestep, "s")
         model.opt.timestep = timestep
+        check_timestep(model)
     every = _steps_a_sample(model.opt.timestep, sample_rate)
     steps = _steps(model.opt.timestep, inputs, duration)
     times = model.opt.timestep * np.arange(steps + 1)
@@ -100,7 +103,8 @@ def _steps(timestep: float, inputs: Inputs | None, duration: float | None) -> in
     if duration is None:
         if inputs is None:
             raise MjchairError("no duration and no inputs; give one of them")
-        duration = inputs.end
+        # not a step beyond the last sample, where the inputs are zero
+        return max(1, int(inputs.end / timestep + 1e-6))
     _check_positive("duration", duration, "s")
     return max(1, round(duration / timestep))
 
