@@ -175,18 +175,20 @@ def springs(
 ) -> Iterator[tuple[Wheel, Spring]]:
     """Every wheel's springs: along and across the heading, and about the axle.
 
-    Along and across, k = C / sigma is the carcass stiffness at the tire's nominal load and m the
-    mass that the contact point moves against in the model's initial pose, without the ground
-    under it. About the axle they are those of the rolling moment and of the wheel.
+    Along and across, k = C / sigma is the carcass stiffness at the tire's nominal load, or at
+    half the model's weight where that is less, and m the mass that the contact point moves
+    against in the model's initial pose, without the ground under it. About the axle they are those of the rolling moment and of the wheel.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     mujoco.mj_crb(model, data)
     mujoco.mj_factorM(model, data)
+    weight = model.body_subtreemass[0] * np.linalg.norm(model.opt.gravity)
     for wheel in wheels(model) if found is None else found:
         tire = wheel.block
-        load, radius = tire[block.NOMINAL_LOAD], model.geom_size[wheel.geom, 0]
+        load = min(tire[block.NOMINAL_LOAD], 0.5 * weight)  # a car's tire carries no car here
+        radius = model.geom_size[wheel.geom, 0]
         c_kappa, c_alpha, _, _ = law.family_stiffness(tire, load, 0.0, 0.0)
         sigma_x, sigma_y = law.family_relaxation(tire, load, c_kappa, c_alpha)
         slope = law.factors(tire, load)[1]
