@@ -177,7 +177,8 @@ def springs(
 
     Along and across, k = C / sigma is the carcass stiffness at the tire's nominal load, or at
     half the model's weight where that is less, and m the mass that the contact point moves
-    against in the model's initial pose, without the ground under it. About the axle they are those of the rolling moment and of the wheel.
+    against in the model's initial pose, without the ground under it. About the axle they are
+    those of the rolling moment and of the wheel.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
