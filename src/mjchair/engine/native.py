@@ -81,6 +81,64 @@ def _offsets() -> tuple[ModelView, DataView, tuple[int, int, int, int]]:
     return ModelView(*model), DataView(*data), sizes
 
 
+# at module level, since Numba keys its cache by the pickle of what a closure holds, and a compiled
+# function pickles differently in every process
+OM, OD, (NUSER_GEOM, NUSER_SENSOR, NCON, CONTACT) = _offsets()
+CONTACT_SIZE = layout.contact_size()
+
+
+@njit(error_model="numpy", forceinline=True)  # type: ignore[untyped-decorator]
+def _model_view(m):  # type: ignore[no-untyped-def]
+    return ModelView(
+        _load(m + OM.timestep, types.float64),
+        _load(m + OM.nsensor, types.int64),
+        _ints(m + OM.actuator_trntype),
+        _ints(m + OM.actuator_dyntype),
+        _ints(m + OM.actuator_actadr),
+        carray(_pointer(_load(m + OM.actuator_trnid, types.int64), types.int32), (MANY, 2)),
+        _ints(m + OM.jnt_bodyid),
+        _ints(m + OM.body_geomadr),
+        _ints(m + OM.body_geomnum),
+        _ints(m + OM.body_rootid),
+        _ints(m + OM.geom_bodyid),
+        _rows(m + OM.geom_user, _load(m + NUSER_GEOM, types.int64)),
+        _rows(m + OM.geom_surfacevel, 6),
+        _ints(m + OM.sensor_type),
+        _ints(m + OM.sensor_objtype),
+        _ints(m + OM.sensor_objid),
+        _ints(m + OM.sensor_adr),
+        _ints(m + OM.sensor_dim),
+        _rows(m + OM.sensor_user, _load(m + NUSER_SENSOR, types.int64)),
+    )
+
+
+@njit(error_model="numpy", forceinline=True)  # type: ignore[untyped-decorator]
+def _data_view(d):  # type: ignore[no-untyped-def]
+    count = _load(d + NCON, types.int32)
+    first = _load(d + CONTACT, types.int64)
+    reals = carray(_pointer(first, types.float64), (count, CONTACT_SIZE // 8))
+    ints = carray(_pointer(first, types.int32), (count, CONTACT_SIZE // 4))
+    return DataView(
+        _reals(d + OD.act),
+        _reals(d + OD.act_dot),
+        _rows(d + OD.xfrc_applied, 6),
+        _rows(d + OD.xipos, 3),
+        _rows(d + OD.geom_xpos, 3),
+        _rows(d + OD.geom_xmat, 9),
+        _rows(d + OD.site_xmat, 9),
+        _rows(d + OD.cvel, 6),
+        _rows(d + OD.subtree_com, 3),
+        _reals(d + OD.sensordata),
+        _reals(d + OD.efc_force),
+        reals[:, OD.contact_dist // 8],
+        reals[:, OD.contact_pos // 8 : OD.contact_pos // 8 + 3],
+        reals[:, OD.contact_frame // 8 : OD.contact_frame // 8 + 9],
+        reals[:, OD.contact_includemargin // 8],
+        ints[:, OD.contact_geom // 4 : OD.contact_geom // 4 + 2],
+        ints[:, OD.contact_efc_address // 4],
+    )
+
+
 @functools.cache
 def callbacks() -> tuple[Any, Any]:
     """The compiled `mjcb_act_dyn` and `mjcb_sensor`, as Numba cfuncs (cached on disk).
@@ -90,69 +148,17 @@ def callbacks() -> tuple[Any, Any]:
     """
     layout.check()
     sources = fingerprint() + mujoco.__version__  # in the closure: part of Numba's cache key
-    om, od, (nuser_geom, nuser_sensor, ncon, contact) = _offsets()
-    size = layout.contact_size()
-
-    @njit(error_model="numpy", forceinline=True)  # type: ignore[untyped-decorator]
-    def model_view(m):  # type: ignore[no-untyped-def]
-        return ModelView(
-            _load(m + om.timestep, types.float64),
-            _load(m + om.nsensor, types.int64),
-            _ints(m + om.actuator_trntype),
-            _ints(m + om.actuator_dyntype),
-            _ints(m + om.actuator_actadr),
-            carray(_pointer(_load(m + om.actuator_trnid, types.int64), types.int32), (MANY, 2)),
-            _ints(m + om.jnt_bodyid),
-            _ints(m + om.body_geomadr),
-            _ints(m + om.body_geomnum),
-            _ints(m + om.body_rootid),
-            _ints(m + om.geom_bodyid),
-            _rows(m + om.geom_user, _load(m + nuser_geom, types.int64)),
-            _rows(m + om.geom_surfacevel, 6),
-            _ints(m + om.sensor_type),
-            _ints(m + om.sensor_objtype),
-            _ints(m + om.sensor_objid),
-            _ints(m + om.sensor_adr),
-            _ints(m + om.sensor_dim),
-            _rows(m + om.sensor_user, _load(m + nuser_sensor, types.int64)),
-        )
-
-    @njit(error_model="numpy", forceinline=True)  # type: ignore[untyped-decorator]
-    def data_view(d):  # type: ignore[no-untyped-def]
-        count = _load(d + ncon, types.int32)
-        first = _load(d + contact, types.int64)
-        reals = carray(_pointer(first, types.float64), (count, size // 8))
-        ints = carray(_pointer(first, types.int32), (count, size // 4))
-        return DataView(
-            _reals(d + od.act),
-            _reals(d + od.act_dot),
-            _rows(d + od.xfrc_applied, 6),
-            _rows(d + od.xipos, 3),
-            _rows(d + od.geom_xpos, 3),
-            _rows(d + od.geom_xmat, 9),
-            _rows(d + od.site_xmat, 9),
-            _rows(d + od.cvel, 6),
-            _rows(d + od.subtree_com, 3),
-            _reals(d + od.sensordata),
-            _reals(d + od.efc_force),
-            reals[:, od.contact_dist // 8],
-            reals[:, od.contact_pos // 8 : od.contact_pos // 8 + 3],
-            reals[:, od.contact_frame // 8 : od.contact_frame // 8 + 9],
-            reals[:, od.contact_includemargin // 8],
-            ints[:, od.contact_geom // 4 : od.contact_geom // 4 + 2],
-            ints[:, od.contact_efc_address // 4],
-        )
 
     @cfunc(types.float64(types.int64, types.int64, types.int32), cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
     def act_dyn(m, d, actuator):  # type: ignore[no-untyped-def]
         _ = sources
-        wheel.act_dyn(model_view(m), data_view(d), actuator)
+        wheel.act_dyn(_model_view(m), _data_view(d), actuator)
         return 0.0
 
     @cfunc(types.void(types.int64, types.int64, types.int32), cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
     def sensor(m, d, stage):  # type: ignore[no-untyped-def]
         _ = sources
         if stage == STAGE_ACC:
-            wheel.sense(model_view(m), data_view(d))
+            wheel.sense(_model_view(m), _data_view(d))
 
     return act_dyn, sensor
