@@ -4,9 +4,9 @@ The paper shows the path of a chair whose rear wheels are pushed unequally, with
 as green arrows, and says that the force "tries to correct the movement" and grows in a curve.
 
 Given by the paper: Magic Formula (5)-(15), Table 1's a0..a13, unequal force on the rear wheels.
-Not given, and assumed here: the chair (the shipped manual one, 90 kg); the pushes (bells of 12 and
-7 N m a wheel, then the stronger side changes, so that the chair turns one way and then the other;
-the paper's path changes its direction); the speed at the start (0.5 m/s); the longitudinal force
+Not given, and assumed here: the chair (the shipped manual one, 90 kg); the pushes (bells of 16 and
+5 N m a wheel, then the stronger side changes, so that the chair turns one way and then the other;
+the paper's path changes its direction); the speed at the start (0.8 m/s); the longitudinal force
 (the paper has none: the tire's lateral curve serves along as well); the standstill law; casters
 that swivel, on the shipped caster tire. The paper's model is plane and has no load transfer.
 
@@ -24,10 +24,10 @@ import mjchair
 from mjchair.report import plots
 from mjchair.storage import output_folder
 
-STRONG, WEAK = 12.0, 7.0  # N m, peak of a push
+STRONG, WEAK = 16.0, 5.0  # N m, peak of a push
 DURATION = 12.0  # s
 CHANGE = 6.0  # s, when the stronger side changes
-SPEED = 0.5  # m/s at the start
+SPEED = 0.8  # m/s at the start
 TIMESTEP = 0.0005  # s; the car tire is too stiff for the shipped 0.002 s
 CAPTION = (
     "Coefficients of Table 1 (Genta 1997), a car tire made for loads near 3 kN: the chair's 90 kg "
@@ -73,7 +73,8 @@ def main(tire: str, name: str, title: str, caption: str) -> int:
     recording.save(folder / f"{name}.npz")
     stiffness = abs(float(lateral_stiffness(tire)))
     text = caption.format(stiffness=stiffness, slip=largest_slip(recording))
-    plots.save(plots.trajectory(recording, title, text, arrows=16), folder / f"{name}.png")
+    figure = plots.trajectory(recording, title, text, arrows=24, components=("lateral",))
+    plots.save(figure, folder / f"{name}.png")
     print(f"{recording.describe()}; {Path(folder) / name}.png")
     print(text)
     return 0
