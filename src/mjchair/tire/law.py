@@ -100,6 +100,12 @@ def steady_forces(p, fz, kappa, tan_alpha, gamma, speed, direction, braked, radi
 
 
 @register_jitable
+def norm(x, y):
+    """Length of a vector; the numbers here are far from overflow, which hypot would guard."""
+    return math.sqrt(x * x + y * y)
+
+
+@register_jitable
 def held_slip(u, w, limit_u, limit_w, sigma_x, sigma_y, vx, vsx, vsy, slide_speed):
     """Deflections cut back where the tire slides, so that nothing winds up.
 
@@ -109,7 +115,7 @@ def held_slip(u, w, limit_u, limit_w, sigma_x, sigma_y, vx, vsx, vsy, slide_spee
     its slip allowed: rolling itself brings its deflections back, and a cut that followed every
     tremor of its slip would shake it.
     """
-    size = math.hypot(u / limit_u, w / limit_w)
+    size = norm(u / limit_u, w / limit_w)
     if size <= 1.0:
         return u, w
     slip = vsx * vsx + vsy * vsy
@@ -117,7 +123,7 @@ def held_slip(u, w, limit_u, limit_w, sigma_x, sigma_y, vx, vsx, vsy, slide_spee
     rolled = abs(vx) + slide_speed * sliding**4
     if rolled == 0.0:
         return u / size, w / size
-    kinematic = math.hypot(vsx * sigma_x / limit_u, vsy * sigma_y / limit_w) / rolled
+    kinematic = norm(vsx * sigma_x / limit_u, vsy * sigma_y / limit_w) / rolled
     allowed = max(1.0, kinematic * (2.0 - sliding))
     return (u * allowed / size, w * allowed / size) if size > allowed else (u, w)
 
@@ -177,8 +183,8 @@ def step_tire(p, u, w, r, fz, gamma, vx, vsx, vsy, spin, yaw_rate, radius, added
     damping = p[block.DAMPING_TIME] / h
     total_x = fx - damping * c_kappa / sigma_x * (new_u - u)
     total_y = fy - damping * c_alpha / sigma_y * (new_w - w)
-    used = math.hypot(total_x / d_x, total_y / d_y)
-    limit = max(math.hypot(fx / d_x, fy / d_y), 1.0)
+    used = norm(total_x / d_x, total_y / d_y)
+    limit = max(norm(fx / d_x, fy / d_y), 1.0)
     if used > limit:
         total_x *= limit / used
         total_y *= limit / used

@@ -67,9 +67,9 @@ class Tire:
     damping_time: float = quantity(0.005, "s", 0.0, 0.1, "carcass damping over stiffness")
     rolling_resistance: float = quantity(0.0, "1", 0.0, 0.5, "rolling moment over load and radius")
     rolling_relaxation: float = quantity(
-        0.003, "m", 1e-5, 0.1, "distance over which the rolling moment builds up"
+        0.005, "m", 1e-5, 0.1, "distance over which the rolling moment builds up"
     )
-    rolling_damping_time: float = quantity(0.2, "s", 0.0, 2.0, "damping of the rolling moment")
+    rolling_damping_time: float = quantity(0.1, "s", 0.0, 2.0, "damping of the rolling moment")
     turning_moment: float = quantity(0.0, "N m", 0.0, 100.0, "moment against the yaw rate")
     friction_factor: float = quantity(1.0, "1", 0.01, 100.0, "scales the peak force")
     stiffness_factor: float = quantity(1.0, "1", 0.01, 100.0, "scales the slip stiffness")

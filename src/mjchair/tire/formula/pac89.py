@@ -58,9 +58,9 @@ def slope(a3, a4, a5, fz, gamma):
     """BCD (N/deg), equation (13): a3 sin(2 atan(Fz / a4)) (1 - a5 |gamma|), gamma in deg.
 
     Printed without the second bar of |gamma|. Without either bar, the same tire leant to the other
-    side would be stiffer.
+    side would be stiffer. sin(2 atan x) is written as 2 x / (1 + x^2), which it equals.
     """
-    return a3 * math.sin(2.0 * math.atan2(fz, a4)) * (1.0 - a5 * abs(gamma))
+    return a3 * 2.0 * fz * a4 / (fz * fz + a4 * a4) * (1.0 - a5 * abs(gamma))
 
 
 @register_jitable
@@ -138,7 +138,7 @@ def forces(p, fz, kappa, tan_alpha, gamma, speed, direction):
 
     rho_x = kx * x / dx if dx > 0.0 else 0.0
     rho_y = ky * y / dy if dy > 0.0 else 0.0
-    rho = math.hypot(rho_x, rho_y)
+    rho = math.sqrt(rho_x * rho_x + rho_y * rho_y)
     if rho_x == 0.0 or rho_y == 0.0 or kx <= 0.0 or ky <= 0.0:  # pure slip
         fx = magic_formula(x, bx, cx, dx, ex)
         fy = magic_formula(y, by, cy, dy, ey) + sv
@@ -147,7 +147,7 @@ def forces(p, fz, kappa, tan_alpha, gamma, speed, direction):
         share_y = abs(rho_y) / rho
         fx = rho_x / rho * magic_formula(rho * dx / kx, bx, cx, dx, ex)
         turned = math.copysign(rho * dy / ky, y)
-        fy = share_y * magic_formula(turned, by, cy, dy, ey) + sv / math.hypot(1.0, rho_x)
+        fy = share_y * magic_formula(turned, by, cy, dy, ey) + sv / math.sqrt(1.0 + rho_x * rho_x)
         turned -= shy
 
     if p[HAS_C] == 0.0:
