@@ -84,8 +84,8 @@ class Faults:
 
     Attributes:
       toe: added to the slip angle, deg. camber: added to the camber, deg.
-      offset: of each cell's reading, N. noise: of a reading, standard deviation over the largest
-        force of the sweep. seed: of the noise.
+      offset: of each cell's reading, N. noise: of each cell's reading, standard deviation over the
+        largest lateral force of the sweep. seed: of the noise.
     """
 
     toe: float = 0.0
@@ -311,20 +311,15 @@ def _read(run: Run) -> Run:
 
 
 def _with_noise(runs: list[Run], faults: Faults) -> list[Run]:
-    """The runs with noise on what the cells give for each run.
-
-    The noise is one error a run (repeatability), not white noise along the trace, which an
-    average would remove.
-    """
+    """The runs with noise: one error a cell and run, which averaging a trace does not remove, and
+    as much again along the trace, which it does."""
     if faults.noise == 0.0:
         return runs
     size = faults.noise * max(abs(run.force[1]) for run in runs)
     rng = np.random.default_rng(faults.seed)
     noisy = []
     for run in runs:
-        error = rng.normal(0.0, size, 3)
-        error[:2] = error[0]  # the mean of the lateral cells gets the whole of it
-        trace = rng.normal(0.0, size, run.cells.shape)
-        trace -= trace[-max(1, round(STEADY * SAMPLES)) :].mean(axis=0)
-        noisy.append(_read(replace(run, cells=run.cells + error + trace)))
+        along = rng.normal(0.0, size, run.cells.shape)
+        along -= along[-max(1, round(STEADY * SAMPLES)) :].mean(axis=0)
+        noisy.append(_read(replace(run, cells=run.cells + rng.normal(0.0, size, 3) + along)))
     return noisy
