@@ -103,9 +103,7 @@ def test_faults_are_seen_in_the_table_and_not_in_the_point():
 
 def test_noise_is_of_its_size_and_seed():
     clean = measure(tire(), sweep(speeds=(0.02,)))
-    one, same, other = (
-        rig._with_noise(clean, Faults(noise=0.02, seed=seed)) for seed in (1, 1, 2)
-    )
+    one, same, other = (rig._with_noise(clean, Faults(noise=0.02, seed=seed)) for seed in (1, 1, 2))
     assert one[5].force == same[5].force
     assert one[5].force != other[5].force
     errors = [a.reading[2] - b.reading[2] for a, b in zip(one, clean, strict=True)]

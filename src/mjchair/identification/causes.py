@@ -125,7 +125,8 @@ def decide(bic: dict[tuple[str, ...], float]) -> Verdict:
     size = 0
     for more in (1, 2):
         now = min(value for group, value in over.items() if len(group) == size)
-        if min(value for group, value in over.items() if len(group) == more) < now - STRONG:
+        larger = [value for group, value in over.items() if len(group) == more]
+        if larger and min(larger) < now - STRONG:
             size = more
     same = sorted((g for g in over if len(g) == size), key=lambda g: over[g])
     alternatives = tuple(g for g in same if over[g] < over[same[0]] + STRONG)

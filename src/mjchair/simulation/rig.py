@@ -94,6 +94,18 @@ class Faults:
     noise: float = 0.0
     seed: int = 0
 
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        for name, value, low, high, unit in (
+            ("toe", self.toe, -30.0, 30.0, "deg"),
+            ("hidden camber", self.camber, -45.0, 45.0, "deg"),
+            ("noise", self.noise, 0.0, 10.0, "of the largest force"),
+        ):
+            if not low <= value <= high:
+                raise MjchairError(
+                    f"{name} is {value:g} {unit}; it must be within {low:g} to {high:g}"
+                )
+
 
 @dataclass(frozen=True)
 class Run:
