@@ -41,6 +41,7 @@ MODEL_ARRAYS = (
     "body_geomnum",
     "body_rootid",
     "geom_bodyid",
+    "geom_size",
     "geom_user",
     "geom_surfacevel",
     "sensor_type",
@@ -50,7 +51,7 @@ MODEL_ARRAYS = (
     "sensor_dim",
     "sensor_user",
 )
-DATA_VALUES = ("ncon",)
+DATA_VALUES = ("ncon", "nisland")
 DATA_ARRAYS = (
     "act",
     "act_dot",
@@ -63,6 +64,10 @@ DATA_ARRAYS = (
     "subtree_com",
     "sensordata",
     "efc_force",
+    "efc_D",
+    "efc_R",
+    "iefc_D",
+    "map_efc2iefc",
 )
 CONTACT_FIELDS = ("dist", "pos", "frame", "includemargin", "geom", "efc_address")
 

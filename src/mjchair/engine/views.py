@@ -21,6 +21,7 @@ class ModelView(NamedTuple):
     body_geomnum: Any
     body_rootid: Any
     geom_bodyid: Any
+    geom_size: Any  # (ngeom, 3)
     geom_user: Any  # (ngeom, nuser_geom)
     geom_surfacevel: Any  # (ngeom, 6)
     sensor_type: Any
@@ -45,6 +46,11 @@ class DataView(NamedTuple):
     subtree_com: Any  # (nbody, 3)
     sensordata: Any
     efc_force: Any
+    efc_D: Any
+    efc_R: Any
+    nisland: Any
+    iefc_D: Any
+    map_efc2iefc: Any
     contact_dist: Any  # (ncon,)
     contact_pos: Any  # (ncon, 3)
     contact_frame: Any  # (ncon, 9)
