@@ -11,7 +11,7 @@ from mujoco import mjtStage
 from numba import carray, cfunc, njit, types
 from numba.extending import intrinsic
 
-from mjchair.engine import layout, wheel
+from mjchair.engine import element, layout, wheel
 from mjchair.engine.views import DataView, ModelView
 from mjchair.tire.compiled import fingerprint
 
@@ -59,10 +59,10 @@ def _rows(field, width):  # type: ignore[no-untyped-def]
     return carray(_pointer(_load(field, types.int64), types.float64), (MANY, width))
 
 
-def _offsets() -> tuple[ModelView, DataView, tuple[int, int, int, int]]:
+def _offsets() -> tuple[ModelView, DataView, tuple[int, int, int, int, int]]:
     """Offsets in bytes, under the names of the views; contact fields from a contact's start.
 
-    The last tuple: nuser_geom, nuser_sensor, ncon, contact.
+    The last tuple: nuser_geom, nuser_sensor, nuser_actuator, ncon, contact.
     """
     model = [layout.offset("mjModel", "opt.timestep")]
     model += [layout.offset("mjModel", name) for name in ModelView._fields[1:]]
@@ -75,6 +75,7 @@ def _offsets() -> tuple[ModelView, DataView, tuple[int, int, int, int]]:
     sizes = (
         layout.offset("mjModel", "nuser_geom"),
         layout.offset("mjModel", "nuser_sensor"),
+        layout.offset("mjModel", "nuser_actuator"),
         layout.offset("mjData", "ncon"),
         layout.offset("mjData", "contact"),
     )
@@ -82,15 +83,15 @@ def _offsets() -> tuple[ModelView, DataView, tuple[int, int, int, int]]:
 
 
 @functools.cache
-def callbacks() -> tuple[Any, Any]:
-    """The compiled `mjcb_act_dyn` and `mjcb_sensor`, as Numba cfuncs (cached on disk).
+def callbacks() -> tuple[Any, Any, Any]:
+    """The compiled `mjcb_act_dyn`, `mjcb_sensor` and `mjcb_act_bias`, as Numba cfuncs (cached on disk).
 
     Raises:
       LayoutError: MuJoCo's memory is not as described.
     """
     layout.check()
     sources = fingerprint() + mujoco.__version__  # in the closure: part of Numba's cache key
-    om, od, (nuser_geom, nuser_sensor, ncon, contact) = _offsets()
+    om, od, (nuser_geom, nuser_sensor, nuser_actuator, ncon, contact) = _offsets()
     size = layout.contact_size()
 
     @njit(error_model="numpy", forceinline=True)  # type: ignore[untyped-decorator]
@@ -102,6 +103,8 @@ def callbacks() -> tuple[Any, Any]:
             _ints(m + om.actuator_dyntype),
             _ints(m + om.actuator_actadr),
             carray(_pointer(_load(m + om.actuator_trnid, types.int64), types.int32), (MANY, 2)),
+            _rows(m + om.actuator_user, _load(m + nuser_actuator, types.int64)),
+            _ints(m + om.site_bodyid),
             _ints(m + om.jnt_bodyid),
             _ints(m + om.body_geomadr),
             _ints(m + om.body_geomnum),
@@ -124,12 +127,14 @@ def callbacks() -> tuple[Any, Any]:
         reals = carray(_pointer(first, types.float64), (count, size // 8))
         ints = carray(_pointer(first, types.int32), (count, size // 4))
         return DataView(
+            _load(d + od.time, types.float64),
             _reals(d + od.act),
             _reals(d + od.act_dot),
             _rows(d + od.xfrc_applied, 6),
             _rows(d + od.xipos, 3),
             _rows(d + od.geom_xpos, 3),
             _rows(d + od.geom_xmat, 9),
+            _rows(d + od.site_xpos, 3),
             _rows(d + od.site_xmat, 9),
             _rows(d + od.cvel, 6),
             _rows(d + od.subtree_com, 3),
@@ -155,4 +160,9 @@ def callbacks() -> tuple[Any, Any]:
         if stage == STAGE_ACC:
             wheel.sense(model_view(m), data_view(d))
 
-    return act_dyn, sensor
+    @cfunc(types.float64(types.int64, types.int64, types.int32), cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+    def act_bias(m, d, actuator):  # type: ignore[no-untyped-def]
+        _ = sources
+        return element.force(model_view(m), data_view(d), actuator)
+
+    return act_dyn, sensor, act_bias
