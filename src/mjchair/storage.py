@@ -50,21 +50,33 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
             temporary.write_bytes(content)
 
 
-def output_folder(path: str | os.PathLike[str], force: bool = False) -> Path:
-    """Make the folder that a command writes into.
+def check_vacant(path: str | os.PathLike[str], force: bool = False) -> Path:
+    """The folder that a command may write into; nothing is made yet.
 
     Args:
-      path: the folder; its parents are made as well.
+      path: the folder.
       force: allow a folder that already holds files.
 
     Raises:
-      MjchairError: the folder holds files and `force` is false, or it cannot be made.
+      MjchairError: the path is a file, or the folder holds files and `force` is false.
     """
     folder = Path(path)
+    if folder.exists() and not folder.is_dir():
+        raise MjchairError(f"{folder} is a file; --out takes a folder")
     if folder.is_dir() and any(folder.iterdir()) and not force:
         raise MjchairError(
             f"{folder} is not empty; choose another --out, or overwrite with --force"
         )
+    return folder
+
+
+def output_folder(path: str | os.PathLike[str], force: bool = False) -> Path:
+    """Make the folder that a command writes into, with its parents.
+
+    Raises:
+      MjchairError: as check_vacant does, or it cannot be made.
+    """
+    folder = check_vacant(path, force)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

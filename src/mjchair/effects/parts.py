@@ -108,17 +108,20 @@ def add_mass(body: Any, mass: float, place: NDArray[np.float64]) -> None:
 
 def write_sensor(spec: mujoco.MjSpec, sensor: Any, data: NDArray[np.float64]) -> None:
     """Write a sensor's `user` field, and make room for it in the specification."""
-    spec.nuser_sensor = max(spec.nuser_sensor, data.size)
+    if 0 <= spec.nuser_sensor < data.size:  # negative: as many as needed
+        spec.nuser_sensor = data.size
     sensor.userdata = data
 
 
 def write_actuator(spec: mujoco.MjSpec, actuator: Any, data: list[float]) -> None:
     """Write an actuator's `user` field, and make room for it in the specification."""
-    spec.nuser_actuator = max(spec.nuser_actuator, len(data))
+    if 0 <= spec.nuser_actuator < len(data):  # negative: as many as needed
+        spec.nuser_actuator = len(data)
     actuator.userdata = data
 
 
 def write_geom(spec: mujoco.MjSpec, geom: Any, data: NDArray[np.float64]) -> None:
     """Write a geom's `user` field, and make room for it in the specification."""
-    spec.nuser_geom = max(spec.nuser_geom, data.size)
+    if 0 <= spec.nuser_geom < data.size:  # negative: as many as needed
+        spec.nuser_geom = data.size
     geom.userdata = data

@@ -101,10 +101,11 @@ def struct(name: str) -> type[ctypes.Structure]:
 
 def offset(name: str, member: str) -> int:
     """Bytes from the start of the struct `name` to `member`; "opt.timestep" reaches inside."""
-    total, kind = 0, struct(name)
+    total = 0
+    kind: Any = struct(name)
     for part in member.split("."):
         total += getattr(kind, part).offset
-        kind = dict(kind._fields_)[part]  # type: ignore[misc,arg-type]
+        kind = dict(kind._fields_)[part]
     return total
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from mjchair import tire as tire_floor
 from mjchair.errors import MjchairError, nearest
 from mjchair.model import assets
-from mjchair.model.wheels import SUFFIX, WHEELS, base_name, check, plain_name
+from mjchair.model.wheels import SUFFIX, WHEELS, base_name, check, cut_damping, plain_name, wheels
 from mjchair.tire import Tire, block
 
 TireChoice = str | os.PathLike[str] | Tire
@@ -47,6 +47,7 @@ def load_spec(
         at its origin, in its orientation.
       tire: a shipped tire, a path, or a Tire for all wheels; or a mapping from wheel names,
         "wheels" or "casters" to those. None: the tires that the file has, else the default ones.
+        On a wheel too light for a tire's damping at standstill that damping is cut.
       grade: rise over run of the ramp (along +x) or of the cross slope (along +y), 1.
       tilt: "floor" turns floor and chair in the world; "gravity" leaves them level and turns
         gravity.
@@ -69,7 +70,11 @@ def load_spec(
             f"{model} brings its own floor, so grade {grade:g} has no scene to tilt; leave it out"
         )
     set_tires(spec, tire)
-    check(compile_spec(spec))
+    compiled = compile_spec(spec)
+    cut_damping(compiled)
+    for wheel in wheels(compiled):
+        spec.geom(compiled.geom(wheel.geom).name).userdata = wheel.block
+    check(compiled)
     return spec
 
 
@@ -117,7 +122,7 @@ def _place(chair: mujoco.MjSpec, scene: mujoco.MjSpec) -> mujoco.MjSpec:
     floor = scene.geom(FLOOR)
     if floor is None:
         raise MjchairError(
-            f"scene {scene.modelname!r} has no geom {FLOOR!r} to stand the chair on; name its floor so"
+            f"scene {scene.modelname!r} has no geom {FLOOR!r} to stand the chair on; name one so"
         )
     exact_xml()
     for field in ("timestep", "integrator", "cone", "tolerance"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import mujoco
@@ -107,48 +108,105 @@ def check(model: mujoco.MjModel) -> None:
     check_timestep(model, found)
 
 
-def check_timestep(model: mujoco.MjModel, found: list[Wheel] | None = None) -> None:
-    """Hold the time step h against k h^2 / m + 2 c h / m < 4 for every tire.
+# k h^2 / m + 2 c h / m of a spring and damper stepped force after state must stay below this
+STABLE = 4.0
+COMFORTABLE = 1.5  # where cut damping brings it, so that twice the step is still stable
+LEAST = 0.5  # of it, that damping keeps whatever the stiffness takes
 
-    Along and across the heading k = C / sigma is the carcass stiffness at the nominal load, c its
-    damping, and m the mass that the contact point moves against in the model's initial pose,
-    without the ground under it. About the axle k and c are those of the rolling moment, and m is
-    the inertia that the wheel turns against.
+
+@dataclass(frozen=True)
+class Spring:
+    """One of the springs that a tire is to its wheel at standstill.
+
+    Attributes:
+      axis: "along", "across" or "about its axle". stiffness, damping: N/m and N s/m, about the
+        axle N m/rad and N m s/rad. inertia: kg, about the axle kg m^2.
+      damping_time: index of the tire's damping time in its block.
+    """
+
+    axis: str
+    stiffness: float
+    damping: float
+    inertia: float
+    damping_time: int
+
+    def number(self, h: float) -> float:
+        """k h^2 / m + 2 c h / m at the time step `h` (s)."""
+        return (self.stiffness * h * h + 2.0 * self.damping * h) / self.inertia
+
+    def largest_step(self) -> float:
+        """The step (s) at which the number reaches its limit."""
+        k, c, m = self.stiffness, self.damping, self.inertia
+        return float((np.sqrt(c * c + STABLE * k * m) - c) / k)
+
+
+def check_timestep(model: mujoco.MjModel, found: list[Wheel] | None = None) -> None:
+    """Hold the time step against the stability limit of every tire at standstill.
 
     Raises:
       MjchairError: the limit is passed; the message gives the largest step that is not.
     """
     h = model.opt.timestep
+    for wheel, spring in springs(model, found):
+        if spring.number(h) >= STABLE:
+            raise MjchairError(
+                f"timestep {h:g} s is beyond the stability limit of {wheel.name}'s tire "
+                f"{spring.axis}; use at most {0.9 * spring.largest_step():.2g} s, or a tire with "
+                "a longer relaxation length"
+            )
+
+
+def cut_damping(model: mujoco.MjModel) -> None:
+    """Cut the damping times of tires on wheels too light for them, in the model's blocks.
+
+    A tire that suits a rear wheel is often put on the casters as well. Its stiffness is physics;
+    its damping is assumed, and settles the chair at standstill only.
+    """
+    h = model.opt.timestep
+    for wheel, spring in springs(model):
+        spare = max(COMFORTABLE - spring.stiffness * h * h / spring.inertia, LEAST)
+        if spring.number(h) > 2.0 * COMFORTABLE:
+            most = 0.5 * spare * spring.inertia / (h * spring.stiffness)
+            wheel.block[spring.damping_time] = min(most, wheel.block[spring.damping_time])
+
+
+def springs(
+    model: mujoco.MjModel, found: list[Wheel] | None = None
+) -> Iterator[tuple[Wheel, Spring]]:
+    """Every wheel's springs: along and across the heading, and about the axle.
+
+    Along and across, k = C / sigma is the carcass stiffness at the tire's nominal load, or at
+    half the model's weight where that is less, and m the mass that the contact point moves
+    against in the model's initial pose, without the ground under it. About the axle they are
+    those of the rolling moment and of the wheel.
+    """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     mujoco.mj_crb(model, data)
     mujoco.mj_factorM(model, data)
+    weight = model.body_subtreemass[0] * np.linalg.norm(model.opt.gravity)
     for wheel in wheels(model) if found is None else found:
-        inertia = contact_inertia(model, data, wheel)
-        for (axis, k, c), m in zip(_springs(model, wheel), inertia, strict=True):
-            if k * h * h / m + 2.0 * c * h / m < 4.0:
-                continue
-            most = (np.sqrt(c**2 + 4.0 * k * m) - c) / k
-            raise MjchairError(
-                f"timestep {h:g} s is beyond the stability limit of {wheel.name}'s tire {axis}; "
-                f"use at most {0.9 * most:.2g} s, or a tire with longer relaxation or less damping"
-            )
-
-
-def _springs(model: mujoco.MjModel, wheel: Wheel) -> list[tuple[str, float, float]]:
-    """Stiffness and damping along (N/m), across (N/m) and about the axle (N m/rad) of a tire."""
-    tire = wheel.block
-    load = tire[block.NOMINAL_LOAD]
-    radius = model.geom_size[wheel.geom, 0]
-    c_kappa, c_alpha, _, _ = law.family_stiffness(tire, load, 0.0, 0.0)
-    sigma_x, sigma_y = law.family_relaxation(tire, load, c_kappa, c_alpha)
-    slope = law.factors(tire, load)[1]
-    rolling = tire[block.ROLLING_RESISTANCE] * load * radius**2 / tire[block.ROLLING_RELAXATION]
-    stiffness = (slope * c_kappa / sigma_x, slope * c_alpha / sigma_y, rolling)
-    times = [tire[i] for i in (block.DAMPING_TIME, block.DAMPING_TIME, block.ROLLING_DAMPING_TIME)]
-    axes = ("along", "across", "about its axle")
-    return [(axis, k, k * time) for axis, k, time in zip(axes, stiffness, times, strict=True)]
+        tire = wheel.block
+        load = min(tire[block.NOMINAL_LOAD], 0.5 * weight)  # a car's tire carries no car here
+        radius = model.geom_size[wheel.geom, 0]
+        c_kappa, c_alpha, _, _ = law.family_stiffness(tire, load, 0.0, 0.0)
+        sigma_x, sigma_y = law.family_relaxation(tire, load, c_kappa, c_alpha)
+        slope = law.factors(tire, load)[1]
+        rolling = tire[block.ROLLING_RESISTANCE] * load * radius**2
+        for axis, k, m, at in zip(
+            ("along", "across", "about its axle"),
+            (
+                slope * c_kappa / sigma_x,
+                slope * c_alpha / sigma_y,
+                rolling / tire[block.ROLLING_RELAXATION],
+            ),
+            contact_inertia(model, data, wheel),
+            (block.DAMPING_TIME, block.DAMPING_TIME, block.ROLLING_DAMPING_TIME),
+            strict=True,
+        ):
+            if k > 0.0:
+                yield wheel, Spring(axis, k, k * tire[at], m, at)
 
 
 def contact_inertia(

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from mjchair.errors import MjchairError, nearest
 from mjchair.storage import write_whole
-from mjchair.tire import toml
+from mjchair.tire import tir, toml
 from mjchair.tire.tire import Tire
 
 LARGEST = 1_000_000  # bytes; the largest standard tire files have some 30 kB
-FORMATS = {".toml": toml}
+FORMATS = {".toml": toml, ".tir": tir}
 
 
 def read(path: str | os.PathLike[str]) -> Tire:

@@ -11,13 +11,14 @@ import math
 from numba.extending import register_jitable
 
 from mjchair.tire import block
-from mjchair.tire.formula import linear, pac89
+from mjchair.tire.formula import linear, mf61, pac89
 from mjchair.tire.transient import relax
 
 TURNING_RATE = 0.05  # rad/s, over which the turning moment's sign is smoothed; assumed
 
 pac89_forces, pac89_stiffness = pac89.forces, pac89.stiffness
 linear_forces, linear_stiffness = linear.forces, linear.stiffness
+mf_forces, mf_stiffness, mf_relaxation = mf61.forces, mf61.stiffness, mf61.relaxation
 
 
 @register_jitable
@@ -25,6 +26,8 @@ def family_forces(p, fz, kappa, tan_alpha, gamma, speed, direction):
     """Forces of the family that the block `p` names; see mjchair.tire.formula."""
     if p[block.FAMILY] == block.PAC89:
         return pac89_forces(p, fz, kappa, tan_alpha, gamma, speed, direction)
+    if p[block.FAMILY] >= block.MF52:
+        return mf_forces(p, fz, kappa, tan_alpha, gamma, speed, direction)
     return linear_forces(p, fz, kappa, tan_alpha, gamma, speed, direction)
 
 
@@ -33,13 +36,20 @@ def family_stiffness(p, fz, gamma, speed):
     """Slopes and peaks of the family that the block `p` names; see mjchair.tire.formula."""
     if p[block.FAMILY] == block.PAC89:
         return pac89_stiffness(p, fz, gamma, speed)
+    if p[block.FAMILY] >= block.MF52:
+        return mf_stiffness(p, fz, gamma, speed)
     return linear_stiffness(p, fz, gamma, speed)
 
 
 @register_jitable
 def family_relaxation(p, fz, c_kappa, c_alpha):
-    """Relaxation lengths (m) along and across."""
-    return p[block.RELAXATION_X], p[block.RELAXATION_Y]
+    """Relaxation lengths (m) along and across: the block's, or the family's own where that is 0."""
+    x, y = p[block.RELAXATION_X], p[block.RELAXATION_Y]
+    if p[block.FAMILY] >= block.MF52 and (x == 0.0 or y == 0.0):
+        own_x, own_y = mf_relaxation(p, fz, c_kappa, c_alpha)
+        x = own_x if x == 0.0 else x
+        y = own_y if y == 0.0 else y
+    return x, y
 
 
 @register_jitable
@@ -61,7 +71,7 @@ def factors(p, fz):
 
 
 @register_jitable
-def steady_forces(p, fz, kappa, tan_alpha, gamma, speed, direction, radius, friction):
+def steady_forces(p, fz, kappa, tan_alpha, gamma, speed, direction, braked, radius, friction):
     """Steady-state forces and moments of one tire.
 
     The factors scale the curve by similarity (Pacejka 2006, section 4.2.1): the slip by stiffness
@@ -71,8 +81,8 @@ def steady_forces(p, fz, kappa, tan_alpha, gamma, speed, direction, radius, fric
       p: the block of mjchair.tire.block.
       fz: load, N, not negative. kappa: longitudinal slip, 1, positive when driving.
       tan_alpha: Vsy / |Vx|, 1. gamma: camber, rad, about +x. speed: Vx, m/s.
-      direction: of rolling, -1 to 1. radius: of rolling, m.
-      friction: factor of the road, 1.
+      direction: of rolling, -1 to 1. braked: the same for the rolling moment, which is damped.
+      radius: of rolling, m. friction: factor of the road, 1.
 
     Returns:
       Fx, Fy (N), Mx, My, Mz (N m) on the wheel, ISO-W axes.
@@ -85,24 +95,33 @@ def steady_forces(p, fz, kappa, tan_alpha, gamma, speed, direction, radius, fric
     fx, fy, mx, my, mz = family_forces(
         p, fz, kappa * stretch, tan_alpha * stretch, gamma, speed, direction
     )
-    my = (my - p[block.ROLLING_RESISTANCE] * fz * radius) * direction
+    my = (my - p[block.ROLLING_RESISTANCE] * fz * radius) * braked
     return peak * fx, peak * fy, mx, my, peak * mz
 
 
 @register_jitable
-def held_slip(u, w, limit_u, limit_w, vx, vsx, vsy, slide_speed):
+def norm(x, y):
+    """Length of a vector; the numbers here are far from overflow, which hypot would guard."""
+    return math.sqrt(x * x + y * y)
+
+
+@register_jitable
+def held_slip(u, w, limit_u, limit_w, sigma_x, sigma_y, vx, vsx, vsy, slide_speed):
     """Deflections cut back where the tire slides, so that nothing winds up.
 
     A deflection may stand for as much slip as slides (three times the knee D/C), or for the
-    kinematic slip where that is more, with `slide_speed` added to the rolling speed.
+    kinematic slip where that is more. A wheel that slides without rolling has `slide_speed` added
+    to its rolling speed; one that rolls, however slowly, has next to nothing added.
     """
-    size = math.hypot(u / limit_u, w / limit_w)
+    size = norm(u / limit_u, w / limit_w)
     if size <= 1.0:
         return u, w
-    rolled = abs(vx) + slide_speed
-    kinematic = math.hypot(vsx / limit_u, vsy / limit_w) / rolled
-    # the limits are deflections; the kinematic slip turns into one by the relaxation length,
-    # which the caller has divided out of vsx and vsy
+    slip = vsx * vsx + vsy * vsy
+    sliding = slip / (slip + vx * vx) if slip > 0.0 else 0.0
+    rolled = abs(vx) + slide_speed * sliding**4
+    if rolled == 0.0:
+        return u / size, w / size
+    kinematic = norm(vsx * sigma_x / limit_u, vsy * sigma_y / limit_w) / rolled
     allowed = max(1.0, kinematic)
     return (u * allowed / size, w * allowed / size) if size > allowed else (u, w)
 
@@ -137,29 +156,33 @@ def step_tire(p, u, w, r, fz, gamma, vx, vsx, vsy, spin, yaw_rate, radius, added
         new_w,
         3.0 * sigma_x * d_x / c_kappa,
         3.0 * sigma_y * d_y / c_alpha,
+        sigma_x,
+        sigma_y,
         vx,
-        vsx * sigma_x,
-        vsy * sigma_y,
+        vsx,
+        vsy,
         p[block.SLIDE_SPEED],
     )
     roll_length = p[block.ROLLING_RELAXATION]
     new_r = relax(r, spin * radius, spin * radius, roll_length, h)
     direction = new_r / roll_length
 
-    kappa, tan_alpha = -new_u / sigma_x, new_w / sigma_y
-    fx, fy, mx, my, mz = steady_forces(p, fz, kappa, tan_alpha, gamma, vx, 1.0, radius, friction)
-    my -= added * fz * radius
     braked = direction + p[block.ROLLING_DAMPING_TIME] * (new_r - r) / (h * roll_length)
-    my *= min(max(braked, -1.0), 1.0)
-    mz *= direction
+    braked = min(max(braked, -1.0), 1.0)
+
+    kappa, tan_alpha = -new_u / sigma_x, new_w / sigma_y
+    fx, fy, mx, my, mz = steady_forces(
+        p, fz, kappa, tan_alpha, gamma, vx, direction, braked, radius, friction
+    )
+    my -= added * fz * radius * braked
     if p[block.TURNING_MOMENT] != 0.0:
         mz -= p[block.TURNING_MOMENT] * math.tanh(yaw_rate / TURNING_RATE)
 
     damping = p[block.DAMPING_TIME] / h
     total_x = fx - damping * c_kappa / sigma_x * (new_u - u)
     total_y = fy - damping * c_alpha / sigma_y * (new_w - w)
-    used = math.hypot(total_x / d_x, total_y / d_y)
-    limit = max(math.hypot(fx / d_x, fy / d_y), 1.0)
+    used = norm(total_x / d_x, total_y / d_y)
+    limit = max(norm(fx / d_x, fy / d_y), 1.0)
     if used > limit:
         total_x *= limit / used
         total_y *= limit / used

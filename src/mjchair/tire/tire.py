@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from mjchair.errors import MjchairError, nearest
 from mjchair.tire import block, law
 from mjchair.tire.compiled import fingerprint
-from mjchair.tire.families import COEFFICIENTS
+from mjchair.tire.families import COEFFICIENTS, packed
 
-FRICTION_RANGE = (0.01, 3.0)
+FRICTION_RANGE = (0.01, 5.0)  # racing tires on test belts pass 3
 LOAD_UNITS = {"N": 1.0, "kN": 1000.0}
 
 
@@ -54,7 +54,7 @@ class Tire:
 
     Raises:
       MjchairError: unknown family or coefficient, a number out of its range, a peak friction
-        outside 0.01-3, which is what a list in the wrong unit gives.
+        outside 0.01-5, which is what a list in the wrong unit gives.
     """
 
     name: str
@@ -67,9 +67,9 @@ class Tire:
     damping_time: float = quantity(0.005, "s", 0.0, 0.1, "carcass damping over stiffness")
     rolling_resistance: float = quantity(0.0, "1", 0.0, 0.5, "rolling moment over load and radius")
     rolling_relaxation: float = quantity(
-        0.003, "m", 1e-5, 0.1, "distance over which the rolling moment builds up"
+        0.005, "m", 1e-5, 0.1, "distance over which the rolling moment builds up"
     )
-    rolling_damping_time: float = quantity(0.2, "s", 0.0, 2.0, "damping of the rolling moment")
+    rolling_damping_time: float = quantity(0.1, "s", 0.0, 2.0, "damping of the rolling moment")
     turning_moment: float = quantity(0.0, "N m", 0.0, 100.0, "moment against the yaw rate")
     friction_factor: float = quantity(1.0, "1", 0.01, 100.0, "scales the peak force")
     stiffness_factor: float = quantity(1.0, "1", 0.01, 100.0, "scales the slip stiffness")
@@ -81,7 +81,7 @@ class Tire:
         0.0, "m", 0.0, 0.5, "at zero slip, where the family has no aligning moment of its own"
     )
     slide_speed: float = quantity(0.05, "m/s", 1e-4, 10.0, "slip speed of sliding at standstill")
-    radius: float = quantity(0.3, "m", 0.01, 2.0, "unloaded radius of the tire as measured")
+    radius: float = quantity(0.3, "m", 0.01, 2.0, "unloaded radius; UNLOADED_RADIUS where given")
 
     def __post_init__(self) -> None:
         """Freeze the coefficients and check every number."""
@@ -104,6 +104,8 @@ class Tire:
             "coefficients",
             MappingProxyType({k: float(v) for k, v in self.coefficients.items()}),
         )
+        if self.coefficients.get("UNLOADED_RADIUS"):
+            object.__setattr__(self, "radius", self.coefficients["UNLOADED_RADIUS"])
         object.__setattr__(self, "unused", MappingProxyType(dict(self.unused)))
         for item in fields(self):
             if not item.metadata:
@@ -115,16 +117,22 @@ class Tire:
                     f"tire {self.name}: {item.name} is {value:g} {item.metadata['unit']}; "
                     f"it must be within {low:g} to {high:g}"
                 )
+            if value == 0.0 and item.name.startswith("relaxation") and "mf" not in self.family:
+                raise MjchairError(
+                    f"tire {self.name}: {item.name} is 0, and the family {self.family} has none of "
+                    f"its own; give one above 0 m"
+                )
         self._check_friction()
 
     def _check_friction(self) -> None:
         peak = self.peak_friction(self.nominal_load)
+        low, high = FRICTION_RANGE
         for axis, value in zip(("longitudinal", "lateral"), peak, strict=True):
-            if not FRICTION_RANGE[0] <= value <= FRICTION_RANGE[1]:
+            if not low <= value <= high:
                 hint = "; is it meant in kN, or in N?" if "load_unit" in self.coefficients else ""
                 raise MjchairError(
                     f"tire {self.name}: {axis} peak friction is {value:.4g} at "
-                    f"{self.nominal_load:g} N; it must be within 0.01 to 3{hint}"
+                    f"{self.nominal_load:g} N; it must be within {low:g} to {high:g}{hint}"
                 )
 
     def peak_friction(self, fz: float) -> tuple[float, float]:
@@ -136,16 +144,14 @@ class Tire:
 
     def block(self) -> NDArray[np.float64]:
         """The tire as numbers, in the order of mjchair.tire.block."""
-        names = COEFFICIENTS[self.family]
-        packed = np.zeros(block.HEADER + len(names))
-        packed[block.TAG_AT] = block.TAG
-        packed[block.VERSION_AT] = block.VERSION
-        packed[block.FAMILY] = block.FAMILIES.index(self.family)
+        header = np.zeros(block.HEADER)
+        header[block.TAG_AT] = block.TAG
+        header[block.VERSION_AT] = block.VERSION
+        header[block.FAMILY] = block.FAMILIES.index(self.family)
         for item in fields(self):
             if item.metadata:
-                packed[getattr(block, item.name.upper())] = getattr(self, item.name)
-        packed[block.HEADER :] = [self.coefficients.get(name, 0.0) for name in names]
-        return packed
+                header[getattr(block, item.name.upper())] = getattr(self, item.name)
+        return np.concatenate([header, packed(self.family, self.coefficients, self.radius)])
 
     def forces(
         self,
@@ -192,6 +198,7 @@ def _forces_loop() -> Callable[..., None]:
                 tan_alpha[i],
                 gamma[i],
                 speed[i],
+                direction,
                 direction,
                 p[block.RADIUS],
                 1.0,

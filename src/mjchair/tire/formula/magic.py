@@ -11,7 +11,9 @@ from numba.extending import register_jitable
 def magic_formula(x, b, c, d, e):
     """D sin(C atan(B x - E (B x - atan(B x)))): equation (5) of Silva & Dedini (2007)."""
     bx = b * x
-    return d * math.sin(c * math.atan(bx - e * (bx - math.atan(bx))))
+    if e != 0.0:
+        bx -= e * (bx - math.atan(bx))
+    return d * math.sin(c * math.atan(bx))
 
 
 @register_jitable

@@ -30,19 +30,66 @@ DEGREE = 180.0 / math.pi
 
 
 @register_jitable
+def shape_factor(a0):
+    """C, equation (9) of the paper: C = a0, the same at every load."""
+    return a0
+
+
+@register_jitable
+def peak(mu, fz):
+    """D (N), equation (10): D = mu Fz. mu: N per unit of load of the list."""
+    return mu * fz
+
+
+@register_jitable
+def peak_friction(a1, a2, fz):
+    """mu (N per unit of load), equation (11): mu = a1 Fz + a2."""
+    return a1 * fz + a2
+
+
+@register_jitable
+def curvature(a6, a7, fz):
+    """E, equation (12): E = a6 Fz + a7."""
+    return a6 * fz + a7
+
+
+@register_jitable
+def slope(a3, a4, a5, fz, gamma):
+    """BCD (N/deg), equation (13): a3 sin(2 atan(Fz / a4)) (1 - a5 |gamma|), gamma in deg.
+
+    Printed without the second bar of |gamma|. Without either bar, the same tire leant to the other
+    side would be stiffer. sin(2 atan x) is written as 2 x / (1 + x^2), which it equals.
+    """
+    return a3 * 2.0 * fz * a4 / (fz * fz + a4 * a4) * (1.0 - a5 * abs(gamma))
+
+
+@register_jitable
+def horizontal_shift(a8, a9, a10, fz, gamma):
+    """Sh (deg), equation (14): Sh = a8 gamma + a9 Fz + a10."""
+    return a8 * gamma + a9 * fz + a10
+
+
+@register_jitable
+def vertical_shift(a11, a12, a13, fz, gamma):
+    """Sv (N), equation (15): Sv = a11 gamma Fz + a12 Fz + a13."""
+    return a11 * gamma * fz + a12 * fz + a13
+
+
+@register_jitable
 def lateral(p, fz, gamma):
     """C, D, E, BCD (N/deg), Sh (deg), Sv (N): equations (9)-(15) of the paper.
 
     Args:
       p: the block. fz: load, in the unit of the list. gamma: camber, deg.
     """
-    d = (p[A + 1] * fz + p[A + 2]) * fz
-    e = p[A + 6] * fz + p[A + 7]
-    # (13) is printed without the second bar of |gamma|
-    bcd = p[A + 3] * math.sin(2.0 * math.atan2(fz, p[A + 4])) * (1.0 - p[A + 5] * abs(gamma))
-    sh = p[A + 8] * gamma + p[A + 9] * fz + p[A + 10]
-    sv = p[A + 11] * gamma * fz + p[A + 12] * fz + p[A + 13]
-    return p[A], d, e, bcd, sh, sv
+    return (
+        shape_factor(p[A]),
+        peak(peak_friction(p[A + 1], p[A + 2], fz), fz),
+        curvature(p[A + 6], p[A + 7], fz),
+        slope(p[A + 3], p[A + 4], p[A + 5], fz, gamma),
+        horizontal_shift(p[A + 8], p[A + 9], p[A + 10], fz, gamma),
+        vertical_shift(p[A + 11], p[A + 12], p[A + 13], fz, gamma),
+    )
 
 
 @register_jitable
@@ -91,7 +138,7 @@ def forces(p, fz, kappa, tan_alpha, gamma, speed, direction):
 
     rho_x = kx * x / dx if dx > 0.0 else 0.0
     rho_y = ky * y / dy if dy > 0.0 else 0.0
-    rho = math.hypot(rho_x, rho_y)
+    rho = math.sqrt(rho_x * rho_x + rho_y * rho_y)
     if rho_x == 0.0 or rho_y == 0.0 or kx <= 0.0 or ky <= 0.0:  # pure slip
         fx = magic_formula(x, bx, cx, dx, ex)
         fy = magic_formula(y, by, cy, dy, ey) + sv
@@ -100,7 +147,7 @@ def forces(p, fz, kappa, tan_alpha, gamma, speed, direction):
         share_y = abs(rho_y) / rho
         fx = rho_x / rho * magic_formula(rho * dx / kx, bx, cx, dx, ex)
         turned = math.copysign(rho * dy / ky, y)
-        fy = share_y * magic_formula(turned, by, cy, dy, ey) + sv / math.hypot(1.0, rho_x)
+        fy = share_y * magic_formula(turned, by, cy, dy, ey) + sv / math.sqrt(1.0 + rho_x * rho_x)
         turned -= shy
 
     if p[HAS_C] == 0.0:

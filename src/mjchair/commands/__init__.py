@@ -1,0 +1,1 @@
+"""The command line's subcommands: each file has `add(subparsers)` and `run(args) -> exit code`."""

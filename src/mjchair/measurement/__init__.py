@@ -1,0 +1,1 @@
+"""Measurements: measured runs and instrumented wheels, read and validated."""

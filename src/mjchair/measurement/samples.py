@@ -1,0 +1,23 @@
+"""Where the shipped measurements are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+_PACKAGE = Path(__file__).parents[1]
+
+
+def folder() -> Path:
+    """The folder `data`: inside the installed package, or beside the sources of a checkout."""
+    installed = _PACKAGE / "data"
+    return installed if installed.is_dir() else _PACKAGE.parents[1] / "data"
+
+
+def propulsion() -> Path:
+    """The SmartWheel excerpt with pushes."""
+    return folder() / "smartwheel" / "propulsion.csv"
+
+
+def baseline() -> Path:
+    """The SmartWheel excerpt with no hand on the rim."""
+    return folder() / "smartwheel" / "baseline.csv"

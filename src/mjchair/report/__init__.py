@@ -1,0 +1,1 @@
+"""Reports: films and figures of a recording."""

@@ -1,0 +1,1 @@
+"""Simulation: drive inputs, and the recording that a run leaves."""
