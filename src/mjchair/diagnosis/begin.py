@@ -31,10 +31,7 @@ def observed(run: Run) -> NDArray[np.bool_]:
     """Which of the slow states (chair.SLOW) the run's channels see directly, (7,)."""
     have = set(run.trial.channels)
     place = {"position.x", "position.y"} <= have
-    rolls = bool(
-        have
-        & {"left_wheel_speed", "right_wheel_speed", "left_wheel_angle", "velocity.x"}
-    )
+    rolls = bool(have & {"left_wheel_speed", "right_wheel_speed", "left_wheel_angle", "velocity.x"})
     both = {"left_wheel_speed", "right_wheel_speed"} <= have
     return np.array(
         [

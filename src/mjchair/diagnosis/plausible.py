@@ -81,7 +81,9 @@ def _check_limits(trial: Trial) -> None:
         limit = next((v for end, v in LIMITS.items() if sensor.endswith(end)), np.inf)
         if _size(values) <= limit:
             continue
-        what = "degrees" if _size(values) / DEGREES <= limit and "acc" not in name else "other units"
+        what = (
+            "degrees" if _size(values) / DEGREES <= limit and "acc" not in name else "other units"
+        )
         raise MjchairError(
             f"{trial.name}: {name} looks like {what}: it reaches {_size(values):.3g}, and no chair "
             f"passes {limit:g} in SI; give SI, or the unit in its header, as in {name} [deg/s]"

@@ -57,9 +57,7 @@ def differences(
                 point.edit(spec)
 
             model = shooter.compile(edit)
-            jobs = [
-                Job(model, w, s) for w, s in zip(shooter.windows, track.states, strict=True)
-            ]
+            jobs = [Job(model, w, s) for w, s in zip(shooter.windows, track.states, strict=True)]
             columns.append(
                 [
                     point.factor * (seen.observe(shooter, w, o.predicted) - y)
@@ -76,9 +74,7 @@ def differences(
 
 def _unwrapped(shooter: Shooter, column: Column) -> Column:
     nothing = [np.zeros_like(c) for c in column]
-    return [
-        residual(c, n, shooter.channels) for c, n in zip(column, nothing, strict=True)
-    ]
+    return [residual(c, n, shooter.channels) for c, n in zip(column, nothing, strict=True)]
 
 
 def half_step(spec: mujoco.MjSpec) -> None:
@@ -91,9 +87,7 @@ def other_integrator(spec: mujoco.MjSpec) -> None:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
 
 
-def sensor_column(
-    shooter: Shooter, track: Track, kind: str, channel: str, size: float
-) -> Column:
+def sensor_column(shooter: Shooter, track: Track, kind: str, channel: str, size: float) -> Column:
     """What a bias (SI), a scale (1) or a delay (s) of one channel changes."""
     which = list(shooter.channels).index(channel)
     out = []
@@ -211,7 +205,9 @@ def _force(shooter: Shooter, chair: Chair, track: Track, pulse: Pulse) -> Array:
 
 
 def _fit(values: Array, steps: int) -> Array:
-    return values[:steps] if len(values) >= steps else np.pad(values, (0, steps - len(values)), "edge")
+    return (
+        values[:steps] if len(values) >= steps else np.pad(values, (0, steps - len(values)), "edge")
+    )
 
 
 def headings(chair: Chair, qpos: Array) -> tuple[Array, Array]:
@@ -220,5 +216,3 @@ def headings(chair: Chair, qpos: Array) -> tuple[Array, Array]:
     east, north = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)
     size = np.hypot(east, north)
     return east / size, north / size
-
-

@@ -243,7 +243,9 @@ def residual(measured: Array, predicted: Array, channels: Sequence[str]) -> Arra
 
 def _resized(force: Array | None, steps: int) -> Array:
     assert force is not None
-    return force[:steps] if len(force) >= steps else np.pad(force, ((0, steps - len(force)), (0, 0)))
+    return (
+        force[:steps] if len(force) >= steps else np.pad(force, ((0, steps - len(force)), (0, 0)))
+    )
 
 
 def _coasting(run: Run, model: mujoco.MjModel) -> mujoco.MjModel:

@@ -107,9 +107,7 @@ def track(
                     states[i] = _slow_of(chair, before.states[i], states[i])
             rounds = ROUNDS if before is None else 1
             for _ in range(rounds):
-                _fit_round(
-                    shooter, chair, model, observer, members, states, white, predicted, slow
-                )
+                _fit_round(shooter, chair, model, observer, members, states, white, predicted, slow)
             jobs = [Job(model, shooter.windows[i], _some(states[i])) for i in members]
             for i, outcome in zip(members, shooter.run(jobs, trace=True), strict=True):
                 predicted[i] = observer.observe(shooter, shooter.windows[i], outcome.predicted)
@@ -151,7 +149,9 @@ def _fit_round(
     each = 1 + len(SLOW)
     for n, i in enumerate(members):
         w = shooter.windows[i]
-        seen = [observer.observe(shooter, w, o.predicted) for o in outcomes[n * each : n * each + each]]
+        seen = [
+            observer.observe(shooter, w, o.predicted) for o in outcomes[n * each : n * each + each]
+        ]
         predicted[i] = seen[0]
         slow[i] = np.stack([s - seen[0] for s in seen[1:]], axis=2)
         miss = residual(shooter.measured(w), seen[0], shooter.channels)
