@@ -1,5 +1,8 @@
 """The compiled callbacks are held to the plain ones, and install leaves nothing behind."""
 
+import subprocess
+import sys
+
 import mujoco
 import numpy as np
 import pytest
@@ -91,3 +94,10 @@ def test_contact_offsets_are_checked(monkeypatch):
     data = mujoco.MjData(mujoco.MjModel.from_xml_string(layout._PROBE))
     mujoco.mj_forward(mujoco.MjModel.from_xml_string(layout._PROBE), data)
     assert layout._wrong_in_contact(data) == ["mjContact.pos"]
+
+
+def test_compiled_code_is_found_again_by_another_process():
+    mjchair.install()
+    code = "from mjchair.engine import native; print([f.cache_hits for f in native.callbacks()])"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert set(eval(found.stdout)) == {1}

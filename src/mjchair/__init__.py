@@ -4,5 +4,25 @@ from mjchair import tire
 from mjchair.engine.install import install, installed, uninstall
 from mjchair.errors import MjchairError
 from mjchair.model.spec import load_spec
+from mjchair.simulation.initial import Initial
+from mjchair.simulation.inputs import Inputs, constant, push_strokes, read_inputs
+from mjchair.simulation.recording import Recording, Status, load_recording
+from mjchair.simulation.simulate import simulate
 
-__all__ = ["MjchairError", "install", "installed", "load_spec", "tire", "uninstall"]
+__all__ = [
+    "Initial",
+    "Inputs",
+    "MjchairError",
+    "Recording",
+    "Status",
+    "constant",
+    "install",
+    "installed",
+    "load_recording",
+    "load_spec",
+    "push_strokes",
+    "read_inputs",
+    "simulate",
+    "tire",
+    "uninstall",
+]

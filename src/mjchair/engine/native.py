@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import functools
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 from llvmlite import ir
 from mujoco import mjtStage
 from numba import carray, cfunc, njit, types
-from numba.extending import intrinsic
+from numba.extending import intrinsic, register_jitable
 
-from mjchair.engine import layout, wheel
+from mjchair.engine import element, layout, wheel
 from mjchair.engine.views import DataView, ModelView
 from mjchair.tire.compiled import fingerprint
 
@@ -59,11 +59,83 @@ def _rows(field, width):  # type: ignore[no-untyped-def]
     return carray(_pointer(_load(field, types.int64), types.float64), (MANY, width))
 
 
-def _offsets() -> tuple[ModelView, DataView, tuple[int, int, int, int]]:
-    """Offsets in bytes, under the names of the views; contact fields from a contact's start.
+class Sizes(NamedTuple):
+    """Offsets in bytes of sizes and of the contact array, and the size of one contact."""
 
-    The last tuple: nuser_geom, nuser_sensor, ncon, contact.
-    """
+    nuser_geom: int
+    nuser_sensor: int
+    nuser_actuator: int
+    ncon: int
+    contact: int
+    contact_size: int
+
+
+@register_jitable(forceinline=True)
+def _model_view(m, at, sizes):  # type: ignore[no-untyped-def]
+    """The view of the model at the address `m`; `at` holds the offsets under the view's names."""
+    return ModelView(
+        _load(m + at.timestep, types.float64),
+        _load(m + at.nsensor, types.int64),
+        _ints(m + at.actuator_trntype),
+        _ints(m + at.actuator_dyntype),
+        _ints(m + at.actuator_actadr),
+        carray(_pointer(_load(m + at.actuator_trnid, types.int64), types.int32), (MANY, 2)),
+        _rows(m + at.actuator_user, _load(m + sizes.nuser_actuator, types.int64)),
+        _ints(m + at.site_bodyid),
+        _ints(m + at.jnt_bodyid),
+        _ints(m + at.body_geomadr),
+        _ints(m + at.body_geomnum),
+        _ints(m + at.body_rootid),
+        _ints(m + at.geom_bodyid),
+        _rows(m + at.geom_size, 3),
+        _rows(m + at.geom_user, _load(m + sizes.nuser_geom, types.int64)),
+        _rows(m + at.geom_surfacevel, 6),
+        _ints(m + at.sensor_type),
+        _ints(m + at.sensor_objtype),
+        _ints(m + at.sensor_objid),
+        _ints(m + at.sensor_adr),
+        _ints(m + at.sensor_dim),
+        _rows(m + at.sensor_user, _load(m + sizes.nuser_sensor, types.int64)),
+    )
+
+
+@register_jitable(forceinline=True)
+def _data_view(d, at, sizes):  # type: ignore[no-untyped-def]
+    """The view of the data at the address `d`; contact offsets count from a contact's start."""
+    count = _load(d + sizes.ncon, types.int32)
+    first = _load(d + sizes.contact, types.int64)
+    reals = carray(_pointer(first, types.float64), (count, sizes.contact_size // 8))
+    ints = carray(_pointer(first, types.int32), (count, sizes.contact_size // 4))
+    return DataView(
+        _load(d + at.time, types.float64),
+        _reals(d + at.act),
+        _reals(d + at.act_dot),
+        _rows(d + at.xfrc_applied, 6),
+        _rows(d + at.xipos, 3),
+        _rows(d + at.geom_xpos, 3),
+        _rows(d + at.geom_xmat, 9),
+        _rows(d + at.site_xpos, 3),
+        _rows(d + at.site_xmat, 9),
+        _rows(d + at.cvel, 6),
+        _rows(d + at.subtree_com, 3),
+        _reals(d + at.sensordata),
+        _reals(d + at.efc_force),
+        _reals(d + at.efc_D),
+        _reals(d + at.efc_R),
+        _load(d + at.nisland, types.int32),
+        _reals(d + at.iefc_D),
+        _ints(d + at.map_efc2iefc),
+        reals[:, at.contact_dist // 8],
+        reals[:, at.contact_pos // 8 : at.contact_pos // 8 + 3],
+        reals[:, at.contact_frame // 8 : at.contact_frame // 8 + 9],
+        reals[:, at.contact_includemargin // 8],
+        ints[:, at.contact_geom // 4 : at.contact_geom // 4 + 2],
+        ints[:, at.contact_efc_address // 4],
+    )
+
+
+def _offsets() -> tuple[ModelView, DataView, Sizes]:
+    """Offsets in bytes, under the names of the views; contact fields from a contact's start."""
     model = [layout.offset("mjModel", "opt.timestep")]
     model += [layout.offset("mjModel", name) for name in ModelView._fields[1:]]
     data = [
@@ -72,93 +144,46 @@ def _offsets() -> tuple[ModelView, DataView, tuple[int, int, int, int]]:
         else layout.offset("mjData", name)
         for name in DataView._fields
     ]
-    sizes = (
+    sizes = Sizes(
         layout.offset("mjModel", "nuser_geom"),
         layout.offset("mjModel", "nuser_sensor"),
+        layout.offset("mjModel", "nuser_actuator"),
         layout.offset("mjData", "ncon"),
         layout.offset("mjData", "contact"),
+        layout.contact_size(),
     )
     return ModelView(*model), DataView(*data), sizes
 
 
 @functools.cache
-def callbacks() -> tuple[Any, Any]:
-    """The compiled `mjcb_act_dyn` and `mjcb_sensor`, as Numba cfuncs (cached on disk).
+def callbacks() -> tuple[Any, Any, Any]:
+    """The compiled callbacks act_dyn, sensor and act_bias, as Numba cfuncs, cached on disk.
+
+    What their closures hold is Numba's cache key, so it is plain numbers and text: a function in
+    there would be another one in every process, and nothing would ever be found again.
 
     Raises:
       LayoutError: MuJoCo's memory is not as described.
     """
     layout.check()
-    sources = fingerprint() + mujoco.__version__  # in the closure: part of Numba's cache key
-    om, od, (nuser_geom, nuser_sensor, ncon, contact) = _offsets()
-    size = layout.contact_size()
-
-    @njit(error_model="numpy", forceinline=True)  # type: ignore[untyped-decorator]
-    def model_view(m):  # type: ignore[no-untyped-def]
-        return ModelView(
-            _load(m + om.timestep, types.float64),
-            _load(m + om.nsensor, types.int64),
-            _ints(m + om.actuator_trntype),
-            _ints(m + om.actuator_dyntype),
-            _ints(m + om.actuator_actadr),
-            carray(_pointer(_load(m + om.actuator_trnid, types.int64), types.int32), (MANY, 2)),
-            _ints(m + om.jnt_bodyid),
-            _ints(m + om.body_geomadr),
-            _ints(m + om.body_geomnum),
-            _ints(m + om.body_rootid),
-            _ints(m + om.geom_bodyid),
-            _rows(m + om.geom_size, 3),
-            _rows(m + om.geom_user, _load(m + nuser_geom, types.int64)),
-            _rows(m + om.geom_surfacevel, 6),
-            _ints(m + om.sensor_type),
-            _ints(m + om.sensor_objtype),
-            _ints(m + om.sensor_objid),
-            _ints(m + om.sensor_adr),
-            _ints(m + om.sensor_dim),
-            _rows(m + om.sensor_user, _load(m + nuser_sensor, types.int64)),
-        )
-
-    @njit(error_model="numpy", forceinline=True)  # type: ignore[untyped-decorator]
-    def data_view(d):  # type: ignore[no-untyped-def]
-        count = _load(d + ncon, types.int32)
-        first = _load(d + contact, types.int64)
-        reals = carray(_pointer(first, types.float64), (count, size // 8))
-        ints = carray(_pointer(first, types.int32), (count, size // 4))
-        return DataView(
-            _reals(d + od.act),
-            _reals(d + od.act_dot),
-            _rows(d + od.xfrc_applied, 6),
-            _rows(d + od.xipos, 3),
-            _rows(d + od.geom_xpos, 3),
-            _rows(d + od.geom_xmat, 9),
-            _rows(d + od.site_xmat, 9),
-            _rows(d + od.cvel, 6),
-            _rows(d + od.subtree_com, 3),
-            _reals(d + od.sensordata),
-            _reals(d + od.efc_force),
-            _reals(d + od.efc_D),
-            _reals(d + od.efc_R),
-            _load(d + od.nisland, types.int32),
-            _reals(d + od.iefc_D),
-            _ints(d + od.map_efc2iefc),
-            reals[:, od.contact_dist // 8],
-            reals[:, od.contact_pos // 8 : od.contact_pos // 8 + 3],
-            reals[:, od.contact_frame // 8 : od.contact_frame // 8 + 9],
-            reals[:, od.contact_includemargin // 8],
-            ints[:, od.contact_geom // 4 : od.contact_geom // 4 + 2],
-            ints[:, od.contact_efc_address // 4],
-        )
+    sources = fingerprint() + mujoco.__version__
+    om, od, sizes = _offsets()
 
     @cfunc(types.float64(types.int64, types.int64, types.int32), cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
     def act_dyn(m, d, actuator):  # type: ignore[no-untyped-def]
         _ = sources
-        wheel.act_dyn(model_view(m), data_view(d), actuator)
+        wheel.act_dyn(_model_view(m, om, sizes), _data_view(d, od, sizes), actuator)
         return 0.0
 
     @cfunc(types.void(types.int64, types.int64, types.int32), cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
     def sensor(m, d, stage):  # type: ignore[no-untyped-def]
         _ = sources
         if stage == STAGE_ACC:
-            wheel.sense(model_view(m), data_view(d))
+            wheel.sense(_model_view(m, om, sizes), _data_view(d, od, sizes))
 
-    return act_dyn, sensor
+    @cfunc(types.float64(types.int64, types.int64, types.int32), cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+    def act_bias(m, d, actuator):  # type: ignore[no-untyped-def]
+        _ = sources
+        return element.force(_model_view(m, om, sizes), _data_view(d, od, sizes), actuator)
+
+    return act_dyn, sensor, act_bias

@@ -16,6 +16,8 @@ class ModelView(NamedTuple):
     actuator_dyntype: Any
     actuator_actadr: Any
     actuator_trnid: Any  # (nactuator, 2)
+    actuator_user: Any  # (nactuator, nuser_actuator)
+    site_bodyid: Any
     jnt_bodyid: Any
     body_geomadr: Any
     body_geomnum: Any
@@ -35,12 +37,14 @@ class ModelView(NamedTuple):
 class DataView(NamedTuple):
     """Arrays of the data, shaped as in the bindings, and the contacts as arrays."""
 
+    time: Any  # s
     act: Any
     act_dot: Any
     xfrc_applied: Any  # (nbody, 6)
     xipos: Any  # (nbody, 3)
     geom_xpos: Any  # (ngeom, 3)
     geom_xmat: Any  # (ngeom, 9)
+    site_xpos: Any  # (nsite, 3)
     site_xmat: Any  # (nsite, 9)
     cvel: Any  # (nbody, 6)
     subtree_com: Any  # (nbody, 3)

@@ -230,5 +230,6 @@ def contact_inertia(
     rows[2, model.jnt_dofadr[wheel.joint]] = 1.0
     solved = np.zeros_like(rows)
     mujoco.mj_solveM(model, data, solved, rows)
-    along, across, about = 1.0 / (rows * solved).sum(axis=1)
+    with np.errstate(divide="ignore"):  # a wheel that is held moves nothing: infinite mass
+        along, across, about = 1.0 / (rows * solved).sum(axis=1)
     return along, across, about

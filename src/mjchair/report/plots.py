@@ -25,6 +25,7 @@ from mjchair.storage import whole
 SIDES = {"left_wheel": "#1f4e9c", "right_wheel": "#b03060"}
 MEASURED = "#222222"
 HORIZONTAL = ("lateral", "longitudinal")
+SHORTEST = 0.04  # share of a large force below which an arrow would be no more than a head
 
 
 def save(figure: Figure, path: str | os.PathLike[str], dpi: int = 130) -> None:
@@ -84,7 +85,11 @@ def wheel_speed(
 
 
 def trajectory(
-    recording: Recording, title: str = "", note: str = "", arrows: int = 14, load: bool = False
+    recording: Recording,
+    title: str = "",
+    note: str = "",
+    arrows: int = 14,
+    components: tuple[str, ...] = HORIZONTAL,
 ) -> Figure:
     """The path of the chair from above, with the forces of every tire in their true directions.
 
@@ -96,35 +101,35 @@ def trajectory(
       recording: what was simulated.
       title: of the figure. note: a sentence below it.
       arrows: places along the path at which forces are drawn.
-      load: write each wheel's load (N) beside its contact.
+      components: which forces are drawn, of HORIZONTAL.
     """
     path = recording.vector("position")
     wide, high = np.ptp(path[:, :2], axis=0) + 1.5  # m, with the chair about the path
     height = float(np.clip(8.0 * high / wide + 1.6, 4.0, 8.0))
     figure, axes = plt.subplots(figsize=(9.0, height), layout="constrained")
     axes.plot(path[:, 0], path[:, 1], color="#555555", lw=1.2, label="middle of the rear axle")
-    unit = _newtons_a_metre(recording, path)
+    unit = _newtons_a_metre(recording, path, components)
     model = recording.model.load()
     data = mujoco.MjData(model)
     for sample in _places(recording, path, arrows):
         data.qpos[:] = recording.qpos[sample]
         mujoco.mj_kinematics(model, data)
-        _draw_sample(axes, model, data, recording, sample, unit, load, max(wide, high) / 80.0)
+        _draw_sample(axes, model, data, recording, sample, unit, components)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
     axes.grid(alpha=0.3)
     axes.autoscale_view()
-    _force_legend(axes, unit)
+    _force_legend(axes, unit, components)
     _title(figure, axes, title, note)
     return figure
 
 
-def _newtons_a_metre(recording: Recording, path: Array) -> float:
+def _newtons_a_metre(recording: Recording, path: Array, components: tuple[str, ...]) -> float:
     """N a metre of arrow, such that large forces are a seventh of the path's extent."""
-    size = max(peak(recording, component) for component in HORIZONTAL)
+    size = max(peak(recording, component) for component in components)
     extent = max(float(np.ptp(path[:, :2], axis=0).max()), 1.0)
-    return round_up(max(size, 1e-3) / (extent / 7.0))
+    return round_up(max(size, 1e-3) / (extent / 9.0))
 
 
 def _places(recording: Recording, path: Array, count: int) -> list[int]:
@@ -143,17 +148,17 @@ def _draw_sample(
     recording: Recording,
     sample: int,
     unit: float,
-    load: bool,
-    shortest: float,
+    components: tuple[str, ...],
 ) -> None:
+    least = SHORTEST * max(peak(recording, component) for component in components)
     for wheel in wheel_forces(model, data, recording, sample):
         x, y = wheel.contact[:2]
         forward = np.array([wheel.left[1], -wheel.left[0]])
         half = 0.5 * model.geom_size[model.geom(f"{wheel.wheel}_tire").id, 0] * forward
         axes.plot([x - half[0], x + half[0]], [y - half[1], y + half[1]], color="#999999", lw=2.2)
-        for component in HORIZONTAL:
+        for component in components:
             arrow = wheel.forces[component][:2] / unit
-            if np.linalg.norm(arrow) < shortest:
+            if np.linalg.norm(arrow) * unit < least:
                 continue
             axes.annotate(
                 "",
@@ -168,13 +173,11 @@ def _draw_sample(
                 },
             )
             axes.update_datalim([(x + arrow[0], y + arrow[1])])
-        if load:
-            axes.text(x, y, f"{np.linalg.norm(wheel.forces['load']):.0f} N", fontsize=6)
 
 
-def _force_legend(axes: Axes, unit: float) -> None:
+def _force_legend(axes: Axes, unit: float, components: tuple[str, ...]) -> None:
     entries = [
-        Line2D([], [], color=COLOURS[c], lw=2, label=f"{c} force on the tire") for c in HORIZONTAL
+        Line2D([], [], color=COLOURS[c], lw=2, label=f"{c} force on the tire") for c in components
     ]
     entries.append(Line2D([], [], color="#999999", lw=2.2, label="wheel"))
     entries.append(Line2D([], [], color="#555555", lw=1.2, label="middle of the rear axle"))

@@ -111,7 +111,9 @@ def held_slip(u, w, limit_u, limit_w, sigma_x, sigma_y, vx, vsx, vsy, slide_spee
 
     A deflection may stand for as much slip as slides (three times the knee D/C), or for the
     kinematic slip where that is more. A wheel that slides without rolling has `slide_speed` added
-    to its rolling speed; one that rolls, however slowly, has next to nothing added.
+    to its rolling speed. One that rolls, however slowly, has next to nothing added, and up to twice
+    its slip allowed: rolling itself brings its deflections back, and a cut that followed every
+    tremor of its slip would shake it.
     """
     size = norm(u / limit_u, w / limit_w)
     if size <= 1.0:
@@ -122,7 +124,7 @@ def held_slip(u, w, limit_u, limit_w, sigma_x, sigma_y, vx, vsx, vsy, slide_spee
     if rolled == 0.0:
         return u / size, w / size
     kinematic = norm(vsx * sigma_x / limit_u, vsy * sigma_y / limit_w) / rolled
-    allowed = max(1.0, kinematic)
+    allowed = max(1.0, kinematic * (2.0 - sliding))
     return (u * allowed / size, w * allowed / size) if size > allowed else (u, w)
 
 
