@@ -134,6 +134,8 @@ def ways_of_two(m, d, geom, deepest, a, b):
     c = overlap(m, d, geom, deepest, a, b)
     det = 1.0 - c * c
     da, db = depth_of(d, a), depth_of(d, b)
+    if det <= ENOUGH * ENOUGH:  # they overlap too much to tell
+        return -1.0, -1.0
     return (da - c * db) / det, (db - c * da) / det
 
 
