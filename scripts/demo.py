@@ -52,7 +52,7 @@ def main() -> int:
 
     if not args.no_video:
         try:
-            write_film(recording, folder / "video.mp4", fps=16, progress=True)
+            write_film(recording, folder / "video.mp4", fps=12, progress=True)
         except NoGraphicsError as error:
             print(f"no video: {error}", file=sys.stderr)
     names = ", ".join(sorted(path.name for path in folder.iterdir()))

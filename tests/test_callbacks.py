@@ -100,4 +100,4 @@ def test_compiled_code_is_found_again_by_another_process():
     mjchair.install()
     code = "from mjchair.engine import native; print([f.cache_hits for f in native.callbacks()])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert found.stdout.strip() == "[1, 1]"
+    assert set(eval(found.stdout)) == {1}

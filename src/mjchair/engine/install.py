@@ -1,7 +1,7 @@
 """Put the tire callbacks in place, and take them out again.
 
-MuJoCo's callbacks are global to the process. `mjcb_act_dyn` and `mjcb_sensor` are used;
-`mjcb_control` and the others stay the user's. Models without tires are untouched: their user
+MuJoCo's callbacks are global to the process. `mjcb_act_dyn`, `mjcb_sensor` and `mjcb_act_bias`
+are used; `mjcb_control` and the others stay the user's. Models without tires are untouched: their user
 actuators and user sensors find nothing of ours to do.
 """
 
@@ -16,13 +16,14 @@ import mujoco
 from mjchair.engine import plain
 
 
-def _current() -> tuple[Any, Any]:
-    return mujoco.get_mjcb_act_dyn(), mujoco.get_mjcb_sensor()
+def _current() -> tuple[Any, Any, Any]:
+    return mujoco.get_mjcb_act_dyn(), mujoco.get_mjcb_sensor(), mujoco.get_mjcb_act_bias()
 
 
-def _put(callbacks: tuple[Any, Any]) -> None:
+def _put(callbacks: tuple[Any, Any, Any]) -> None:
     mujoco.set_mjcb_act_dyn(callbacks[0])
     mujoco.set_mjcb_sensor(callbacks[1])
+    mujoco.set_mjcb_act_bias(callbacks[2])
 
 
 def install(compiled: bool = True) -> None:
@@ -38,15 +39,15 @@ def install(compiled: bool = True) -> None:
     if compiled:
         from mjchair.engine import native
 
-        act_dyn, sensor = native.callbacks()
-        _put((act_dyn.ctypes, sensor.ctypes))
+        act_dyn, sensor, act_bias = native.callbacks()
+        _put((act_dyn.ctypes, sensor.ctypes, act_bias.ctypes))
     else:
-        _put((plain.act_dyn, plain.sensor))
+        _put((plain.act_dyn, plain.sensor, plain.act_bias))
 
 
 def uninstall() -> None:
     """Take the callbacks out: wheels roll without friction then."""
-    _put((None, None))
+    _put((None, None, None))
 
 
 @contextmanager

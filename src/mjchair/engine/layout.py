@@ -30,17 +30,20 @@ _SCALARS: dict[str, type] = {
 }
 
 # the fields that the callbacks read or write, by the kind of their elements
-MODEL_VALUES = ("nuser_geom", "nuser_sensor", "nsensor")
+MODEL_VALUES = ("nuser_geom", "nuser_sensor", "nuser_actuator", "nsensor")
 MODEL_ARRAYS = (
     "actuator_trntype",
     "actuator_dyntype",
     "actuator_actadr",
     "actuator_trnid",
+    "actuator_user",
+    "site_bodyid",
     "jnt_bodyid",
     "body_geomadr",
     "body_geomnum",
     "body_rootid",
     "geom_bodyid",
+    "geom_size",
     "geom_user",
     "geom_surfacevel",
     "sensor_type",
@@ -50,7 +53,7 @@ MODEL_ARRAYS = (
     "sensor_dim",
     "sensor_user",
 )
-DATA_VALUES = ("ncon",)
+DATA_VALUES = ("ncon", "nisland", "time")
 DATA_ARRAYS = (
     "act",
     "act_dot",
@@ -58,11 +61,16 @@ DATA_ARRAYS = (
     "xipos",
     "geom_xpos",
     "geom_xmat",
+    "site_xpos",
     "site_xmat",
     "cvel",
     "subtree_com",
     "sensordata",
     "efc_force",
+    "efc_D",
+    "efc_R",
+    "iefc_D",
+    "map_efc2iefc",
 )
 CONTACT_FIELDS = ("dist", "pos", "frame", "includemargin", "geom", "efc_address")
 
@@ -117,7 +125,7 @@ _PROBE = """
       <body name="spin"><joint name="spin"/><geom size="0.01"/></body>
     </body>
   </worldbody>
-  <actuator><general name="tire" joint="spin" dyntype="user" actdim="4"/></actuator>
+  <actuator><general name="tire" joint="spin" dyntype="user" actdim="4" user="1"/></actuator>
   <sensor>
     <user name="tire" objtype="actuator" objname="tire" dim="7" needstage="acc" user="1"/>
   </sensor>

@@ -11,7 +11,7 @@ from mujoco import mjtStage
 from numba import carray, cfunc, njit, types
 from numba.extending import intrinsic, register_jitable
 
-from mjchair.engine import layout, wheel
+from mjchair.engine import element, layout, wheel
 from mjchair.engine.views import DataView, ModelView
 from mjchair.tire.compiled import fingerprint
 
@@ -64,6 +64,7 @@ class Sizes(NamedTuple):
 
     nuser_geom: int
     nuser_sensor: int
+    nuser_actuator: int
     ncon: int
     contact: int
     contact_size: int
@@ -79,11 +80,14 @@ def _model_view(m, at, sizes):  # type: ignore[no-untyped-def]
         _ints(m + at.actuator_dyntype),
         _ints(m + at.actuator_actadr),
         carray(_pointer(_load(m + at.actuator_trnid, types.int64), types.int32), (MANY, 2)),
+        _rows(m + at.actuator_user, _load(m + sizes.nuser_actuator, types.int64)),
+        _ints(m + at.site_bodyid),
         _ints(m + at.jnt_bodyid),
         _ints(m + at.body_geomadr),
         _ints(m + at.body_geomnum),
         _ints(m + at.body_rootid),
         _ints(m + at.geom_bodyid),
+        _rows(m + at.geom_size, 3),
         _rows(m + at.geom_user, _load(m + sizes.nuser_geom, types.int64)),
         _rows(m + at.geom_surfacevel, 6),
         _ints(m + at.sensor_type),
@@ -103,17 +107,24 @@ def _data_view(d, at, sizes):  # type: ignore[no-untyped-def]
     reals = carray(_pointer(first, types.float64), (count, sizes.contact_size // 8))
     ints = carray(_pointer(first, types.int32), (count, sizes.contact_size // 4))
     return DataView(
+        _load(d + at.time, types.float64),
         _reals(d + at.act),
         _reals(d + at.act_dot),
         _rows(d + at.xfrc_applied, 6),
         _rows(d + at.xipos, 3),
         _rows(d + at.geom_xpos, 3),
         _rows(d + at.geom_xmat, 9),
+        _rows(d + at.site_xpos, 3),
         _rows(d + at.site_xmat, 9),
         _rows(d + at.cvel, 6),
         _rows(d + at.subtree_com, 3),
         _reals(d + at.sensordata),
         _reals(d + at.efc_force),
+        _reals(d + at.efc_D),
+        _reals(d + at.efc_R),
+        _load(d + at.nisland, types.int32),
+        _reals(d + at.iefc_D),
+        _ints(d + at.map_efc2iefc),
         reals[:, at.contact_dist // 8],
         reals[:, at.contact_pos // 8 : at.contact_pos // 8 + 3],
         reals[:, at.contact_frame // 8 : at.contact_frame // 8 + 9],
@@ -136,6 +147,7 @@ def _offsets() -> tuple[ModelView, DataView, Sizes]:
     sizes = Sizes(
         layout.offset("mjModel", "nuser_geom"),
         layout.offset("mjModel", "nuser_sensor"),
+        layout.offset("mjModel", "nuser_actuator"),
         layout.offset("mjData", "ncon"),
         layout.offset("mjData", "contact"),
         layout.contact_size(),
@@ -144,8 +156,8 @@ def _offsets() -> tuple[ModelView, DataView, Sizes]:
 
 
 @functools.cache
-def callbacks() -> tuple[Any, Any]:
-    """The compiled `mjcb_act_dyn` and `mjcb_sensor`, as Numba cfuncs, cached on disk.
+def callbacks() -> tuple[Any, Any, Any]:
+    """The compiled callbacks act_dyn, sensor and act_bias, as Numba cfuncs, cached on disk.
 
     What their closures hold is Numba's cache key, so it is plain numbers and text: a function in
     there would be another one in every process, and nothing would ever be found again.
@@ -169,4 +181,9 @@ def callbacks() -> tuple[Any, Any]:
         if stage == STAGE_ACC:
             wheel.sense(_model_view(m, om, sizes), _data_view(d, od, sizes))
 
-    return act_dyn, sensor
+    @cfunc(types.float64(types.int64, types.int64, types.int32), cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+    def act_bias(m, d, actuator):  # type: ignore[no-untyped-def]
+        _ = sources
+        return element.force(_model_view(m, om, sizes), _data_view(d, od, sizes), actuator)
+
+    return act_dyn, sensor, act_bias

@@ -16,11 +16,14 @@ class ModelView(NamedTuple):
     actuator_dyntype: Any
     actuator_actadr: Any
     actuator_trnid: Any  # (nactuator, 2)
+    actuator_user: Any  # (nactuator, nuser_actuator)
+    site_bodyid: Any
     jnt_bodyid: Any
     body_geomadr: Any
     body_geomnum: Any
     body_rootid: Any
     geom_bodyid: Any
+    geom_size: Any  # (ngeom, 3)
     geom_user: Any  # (ngeom, nuser_geom)
     geom_surfacevel: Any  # (ngeom, 6)
     sensor_type: Any
@@ -34,17 +37,24 @@ class ModelView(NamedTuple):
 class DataView(NamedTuple):
     """Arrays of the data, shaped as in the bindings, and the contacts as arrays."""
 
+    time: Any  # s
     act: Any
     act_dot: Any
     xfrc_applied: Any  # (nbody, 6)
     xipos: Any  # (nbody, 3)
     geom_xpos: Any  # (ngeom, 3)
     geom_xmat: Any  # (ngeom, 9)
+    site_xpos: Any  # (nsite, 3)
     site_xmat: Any  # (nsite, 9)
     cvel: Any  # (nbody, 6)
     subtree_com: Any  # (nbody, 3)
     sensordata: Any
     efc_force: Any
+    efc_D: Any
+    efc_R: Any
+    nisland: Any
+    iefc_D: Any
+    map_efc2iefc: Any
     contact_dist: Any  # (ncon,)
     contact_pos: Any  # (ncon, 3)
     contact_frame: Any  # (ncon, 9)

@@ -23,6 +23,7 @@ import math
 from mujoco import mjtDyn, mjtObj, mjtSensor, mjtTrn
 from numba.extending import register_jitable
 
+from mjchair.engine.contact import contact_load, contact_patch, dot, share_load
 from mjchair.tire import block, law
 
 DYN_USER = int(mjtDyn.mjDYN_USER)
@@ -39,15 +40,6 @@ PLAIN, HEADING = range(2)
 
 
 @register_jitable(forceinline=True)
-def dot(rows, row, column, ax, ay, az):
-    """Scalar product of three numbers of a row, from `column` on, with a vector.
-
-    Rows are read by index and never taken as a view: compiled views cost more than the product.
-    """
-    return rows[row, column] * ax + rows[row, column + 1] * ay + rows[row, column + 2] * az
-
-
-@register_jitable(forceinline=True)
 def tire_geom(m, actuator):
     """The tire geom that the actuator is the state of, or -1."""
     if m.actuator_dyntype[actuator] != DYN_USER or m.actuator_trntype[actuator] != TRN_JOINT:
@@ -60,58 +52,6 @@ def tire_geom(m, actuator):
         if m.geom_user[geom, block.TAG_AT] == block.TAG:
             return geom
     return -1
-
-
-@register_jitable(forceinline=True)
-def contact_patch(d, geom):
-    """Where and how the ground touches the geom: its contacts as one, weighted by depth.
-
-    Weights fall to zero where a contact opens, so one that comes or goes makes no kick.
-
-    Returns:
-      weight (m, 0: no contact), normal towards the wheel (3), position (3), the other geom.
-    """
-    weight, deepest, ground = 0.0, 0.0, -1
-    nx = ny = nz = px = py = pz = 0.0
-    for c in range(d.contact_dist.shape[0]):
-        side = 1.0
-        other = d.contact_geom[c, 0]
-        if other == geom:
-            side = -1.0
-            other = d.contact_geom[c, 1]
-        elif d.contact_geom[c, 1] != geom:
-            continue
-        depth = d.contact_includemargin[c] - d.contact_dist[c]
-        if depth <= 0.0 or d.contact_efc_address[c] < 0:
-            continue
-        weight += depth
-        nx += depth * side * d.contact_frame[c, 0]
-        ny += depth * side * d.contact_frame[c, 1]
-        nz += depth * side * d.contact_frame[c, 2]
-        px += depth * d.contact_pos[c, 0]
-        py += depth * d.contact_pos[c, 1]
-        pz += depth * d.contact_pos[c, 2]
-        if depth > deepest:
-            deepest, ground = depth, other
-    size = math.sqrt(nx * nx + ny * ny + nz * nz)
-    if size == 0.0:
-        return 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1
-    return weight, nx / size, ny / size, nz / size, px / weight, py / weight, pz / weight, ground
-
-
-@register_jitable(forceinline=True)
-def contact_load(d, geom, nx, ny, nz):
-    """Solved load (N) of the geom's contacts along the normal; valid after the solve only."""
-    load = 0.0
-    for c in range(d.contact_dist.shape[0]):
-        address = d.contact_efc_address[c]
-        if address < 0:
-            continue
-        if d.contact_geom[c, 0] == geom:
-            load -= d.efc_force[address] * dot(d.contact_frame, c, 0, nx, ny, nz)
-        elif d.contact_geom[c, 1] == geom:
-            load += d.efc_force[address] * dot(d.contact_frame, c, 0, nx, ny, nz)
-    return max(load, 0.0)
 
 
 @register_jitable(forceinline=True)
@@ -197,10 +137,12 @@ def act_dyn(m, d, actuator):
     body = m.geom_bodyid[geom]
     at = m.actuator_actadr[actuator]
     h = m.timestep
-    weight, nx, ny, nz, px, py, pz, ground = contact_patch(d, geom)
+    count, nx, ny, nz, px, py, pz, ground = contact_patch(d, geom)
+    if count > 1:
+        _, nx, ny, nz, px, py, pz, ground = share_load(m, d, geom)
     u, w, r, load = d.act[at], d.act[at + 1], d.act[at + 2], d.act[at + 3]
     force = d.xfrc_applied
-    if weight == 0.0 or load <= 0.0:
+    if ground < 0 or load <= 0.0:
         d.act_dot[at], d.act_dot[at + 1], d.act_dot[at + 2] = -u / h, -w / h, -r / h
         for i in range(6):
             force[body, i] = 0.0

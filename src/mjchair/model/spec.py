@@ -14,15 +14,17 @@ from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mjchair import tire as tire_floor
 from mjchair.errors import MjchairError, nearest
 from mjchair.model import assets
+from mjchair.model.ground import FLOOR, set_heights, set_step
+from mjchair.model.parameters import ChairParameters
 from mjchair.model.wheels import SUFFIX, WHEELS, base_name, check, cut_damping, plain_name, wheels
 from mjchair.tire import Tire, block
 
 TireChoice = str | os.PathLike[str] | Tire
-FLOOR = "floor"
 GROUPS = {"wheels": WHEELS[:2], "casters": WHEELS[2:]}
 DEFAULT_TIRES = {"wheels": "wheelchair", "casters": "caster"}
 
@@ -34,6 +36,9 @@ def load_spec(
     *,
     grade: float | None = None,
     tilt: str = "floor",
+    heights: ArrayLike | None = None,
+    step: float | None = None,
+    parameters: ChairParameters | None = None,
 ) -> mujoco.MjSpec:
     """A chair on its tires in a scene, ready to compile.
 
@@ -51,6 +56,9 @@ def load_spec(
       grade: rise over run of the ramp (along +x) or of the cross slope (along +y), 1.
       tilt: "floor" turns floor and chair in the world; "gravity" leaves them level and turns
         gravity.
+      heights: (nrow, ncol), m, of the scene `hfield`; see mjchair.model.ground.set_heights.
+      step: height of the scene `kerb` or `threshold`, m.
+      parameters: a designer's changes to the chair; see ChairParameters.
 
     Returns:
       The specification; it has been compiled once, to check it.
@@ -64,12 +72,18 @@ def load_spec(
     if spec.geom(FLOOR) is None:
         ground = _read(assets.find("scene", scene, assets.scenes()))
         set_grade(ground, str(scene), grade, tilt)
+        if step is not None:
+            set_step(ground, step)
         spec = _place(spec, ground)
     elif grade is not None:
         raise MjchairError(
             f"{model} brings its own floor, so grade {grade:g} has no scene to tilt; leave it out"
         )
+    if heights is not None:
+        set_heights(spec, heights)
     set_tires(spec, tire)
+    if parameters is not None:
+        parameters.apply(spec)
     compiled = compile_spec(spec)
     cut_damping(compiled)
     for wheel in wheels(compiled):

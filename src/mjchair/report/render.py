@@ -216,7 +216,7 @@ class Film:
 def _draw_faster(model: mujoco.MjModel) -> None:
     """Fewer facets and a smaller shadow map: software OpenGL takes two thirds of the time."""
     quality = model.vis.quality
-    quality.numslices, quality.numstacks = min(quality.numslices, 16), min(quality.numstacks, 8)
+    quality.numslices, quality.numstacks = min(quality.numslices, 14), min(quality.numstacks, 8)
     quality.shadowsize = min(quality.shadowsize, 2048)
 
 
@@ -245,7 +245,8 @@ def _overlay(width: int, height: int, scale: Scale, tires: bool) -> Image.Image:
         return image
     draw, font, line = ImageDraw.Draw(image), _font(height // 30), height // 21
     left, top = round(0.02 * height), round(0.02 * height)
-    rows = [(f"{c} force, {BAR * scale.newtons(c):g} N a bar", COLOURS[c]) for c in COLOURS]
+    names = {"lateral": "lateral force", "longitudinal": "longitudinal force", "load": "load"}
+    rows = [(f"{names[c]}, {BAR * scale.newtons(c):g} N per bar", COLOURS[c]) for c in COLOURS]
     rows.append((f"bar on the ground, {BAR:g} m", (1.0, 1.0, 1.0)))
     wide = max(draw.textlength(text, font) for text, _ in rows)
     box = (left, top, left + 1.9 * line + wide, top + len(rows) * line + 0.5 * line)

@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.errors import MjchairError, nearest
+from mjchair.model.wheels import wheels
 from mjchair.simulation import names
 
 Array = NDArray[np.float64]
 
-SETTLE_TIME = 2.0  # s, at most; a chair is still after some 0.5 s
+SETTLE_TIME = 3.0  # s, at most; casters on a cross slope take longest
 SETTLED = 1e-9  # m/s or rad/s
 SETTLE_DAMPING = 1e4  # N m s/rad on every hinge, so that nothing rolls or swivels meanwhile
 
@@ -89,11 +90,17 @@ def lock_wheels(model: mujoco.MjModel, qpos: Array) -> None:
         model.eq_active0[i] = 1
 
 
-def start(model: mujoco.MjModel, initial: Initial) -> mujoco.MjData:
+def start(model: mujoco.MjModel, initial: Initial, brakes: bool = False) -> mujoco.MjData:
     """Data at time 0: placed, settled on the tires, moving as `initial` says.
 
-    The tire callbacks must be in place. The chair settles with every hinge held; then casters are
-    turned into their direction of travel and wheels spun to roll without slip.
+    The tire callbacks must be in place. Casters are turned into their direction of travel, the
+    chair settles with every hinge held, and wheels are spun to roll without slip; their tires then
+    start without longitudinal force. With brakes it settles on the locks instead, and the tires
+    start with the force that holds it.
+
+    Args:
+      model: to run; its parking brakes are locked here, in place, if `brakes`.
+      initial: where and how. brakes: lock them at the wheel angles of the start.
 
     Raises:
       MjchairError: motion or a place is asked of a model without one `chair` or without a floor.
@@ -105,26 +112,42 @@ def start(model: mujoco.MjModel, initial: Initial) -> mujoco.MjData:
         _place(model, data, initial)
     if moving:
         _turn_casters(model, data, initial)
-    _settle(model, data)
+    if brakes:
+        lock_wheels(model, data.qpos)
+        data.eq_active[:] = model.eq_active0
+    _settle(model, data, held=not brakes)
     if initial.position is not None:
         _shift(model, data, np.asarray(initial.position))
+    if not brakes:
+        _release(model, data)
     if moving:
         _set_velocities(model, data, initial)
     data.time = 0.0
     return data
 
 
-def _settle(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Let the data come to rest on the floor, hinges held; velocities end at zero."""
-    held = copy.copy(model)
-    for joint in range(model.njnt):
-        if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE:
-            held.dof_damping[model.jnt_dofadr[joint]] = SETTLE_DAMPING
+def _settle(model: mujoco.MjModel, data: mujoco.MjData, held: bool) -> None:
+    """Let the data come to rest on the floor; velocities end at zero.
+
+    Args:
+      held: hold every hinge by a damper; else the brakes hold the wheels, and casters are free.
+    """
+    settling = copy.copy(model)
+    if held:
+        hinges = model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE
+        settling.dof_damping[model.jnt_dofadr[hinges]] = SETTLE_DAMPING
     for _ in range(round(SETTLE_TIME / model.opt.timestep)):
-        mujoco.mj_step(held, data)
+        mujoco.mj_step(settling, data)
         if np.abs(data.qvel).max(initial=0.0) < SETTLED:
             break
     data.qvel[:] = 0.0
+
+
+def _release(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Take off the longitudinal and rolling deflection that the held hinges gave the tires."""
+    for wheel in wheels(model):
+        first = model.actuator_actadr[wheel.actuator]
+        data.act[first] = data.act[first + 2] = 0.0
 
 
 def floor_plane(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, Array]:

@@ -20,7 +20,7 @@ from mjchair.model.spec import compile_spec
 from mjchair.model.wheels import check_timestep
 from mjchair.simulation import names
 from mjchair.simulation.channels import channels, control_unit
-from mjchair.simulation.initial import Initial, as_initial, lock_wheels, start
+from mjchair.simulation.initial import Initial, as_initial, start
 from mjchair.simulation.inputs import Inputs, drivable
 from mjchair.simulation.recording import Recording, Status
 from mjchair.simulation.stored_model import StoredModel
@@ -86,10 +86,7 @@ def simulate(
     stored = StoredModel.of(model, spec)
 
     with installed(compiled), _quiet():
-        data = start(model, as_initial(initial))
-        if brakes:
-            lock_wheels(model, data.qpos)
-            data.eq_active[:] = model.eq_active0
+        data = start(model, as_initial(initial), brakes)
         states, sensed, reason = _run(model, data, controls, every, progress)
     return _recording(model, stored, states, sensed, controls[::every], reason, every)
 

@@ -1,0 +1,107 @@
+"""How a run begins: position, heading, speed and yaw rate at its first sample, from its channels."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.diagnosis.study import Run
+from mjchair.simulation.initial import Initial
+
+Array = NDArray[np.float64]
+RADIUS, TRACK = 0.3, 0.56  # m, of the rear wheels; a first guess only
+SPAN = 0.3  # s, of the line through the first samples
+
+
+def _first(run: Run, channel: str) -> tuple[float, float] | None:
+    """Value and slope at the first sample, from a line over the first SPAN; None: not there."""
+    if channel not in run.trial.channels:
+        return None
+    time, values = run.trial.samples(channel)
+    early = time <= run.trial.time[0] + SPAN
+    if early.sum() < 2:
+        return None
+    if channel == "heading":
+        values = np.unwrap(values)
+    slope, value = np.polyfit(time[early] - run.trial.time[0], values[early], 1)
+    return float(value), float(slope)
+
+
+def observed(run: Run) -> NDArray[np.bool_]:
+    """Which of the slow states (chair.SLOW) the run's channels see directly, (7,)."""
+    have = set(run.trial.channels)
+    place = {"position.x", "position.y"} <= have
+    rolls = bool(have & {"left_wheel_speed", "right_wheel_speed", "left_wheel_angle", "velocity.x"})
+    both = {"left_wheel_speed", "right_wheel_speed"} <= have
+    return np.array(
+        [
+            "position.x" in have,
+            "position.y" in have,
+            "heading" in have,
+            rolls or place,
+            "imu_gyro.z" in have or both or "heading" in have,
+            "left_caster_angle" in have,
+            "right_caster_angle" in have,
+        ]
+    )
+
+
+def initial(run: Run) -> Initial:
+    """Position, heading, speed and yaw rate at the first sample.
+
+    What study.toml gives is a first guess as well: every window frees it.
+    """
+    start = run.initial
+    heading = _value(run, "heading", start.heading)
+    x, y = _value(run, "position.x", None), _value(run, "position.y", None)
+    position = start.position if x is None or y is None else (x, y)
+    speed = start.speed if "speed" in run.given else _speed(run)
+    yaw = start.yaw_rate if "yaw_rate" in run.given else _yaw_rate(run)
+    return Initial(position=position, heading=heading or 0.0, speed=speed, yaw_rate=yaw)
+
+
+def _value(run: Run, channel: str, given: float | None) -> float | None:
+    found = _first(run, channel)
+    return given if found is None else found[0]
+
+
+def _speed(run: Run) -> float:
+    wheels = [_first(run, f"{s}_wheel_speed") for s in ("left", "right")]
+    seen = [w[0] * RADIUS for w in wheels if w is not None]
+    if seen:
+        return float(np.mean(seen))
+    forward = _first(run, "velocity.x")
+    if forward is not None:
+        return forward[0]
+    angles = [_first(run, f"{s}_wheel_angle") for s in ("left", "right")]
+    seen = [w[1] * RADIUS for w in angles if w is not None]
+    if seen:
+        return float(np.mean(seen))
+    x, y = _first(run, "position.x"), _first(run, "position.y")
+    if x is not None and y is not None:
+        heading = _value(run, "heading", run.initial.heading) or float(np.arctan2(y[1], x[1]))
+        return float(x[1] * np.cos(heading) + y[1] * np.sin(heading))
+    return _speed_from_acceleration(run)
+
+
+def _speed_from_acceleration(run: Run) -> float:
+    """A chair that stands at the end of its run lost the speed that its accelerometer tells."""
+    if "imu_accelerometer.x" not in run.trial.channels:
+        return 0.0
+    time, pull = run.trial.samples("imu_accelerometer.x")
+    late = time > time[-1] - 0.5
+    still = pull[late].std() < 0.7 * max(pull.std(), 1e-9) or abs(pull[late].mean()) < 0.02
+    bias = float(pull[late].mean()) if still else 0.0
+    lost = -float(np.trapezoid(pull - bias, time))
+    return float(np.clip(lost, 0.0, 5.0)) if still and lost > 0.2 else 1.0
+
+
+def _yaw_rate(run: Run) -> float:
+    gyro = _first(run, "imu_gyro.z")
+    if gyro is not None:
+        return gyro[0]
+    left, right = _first(run, "left_wheel_speed"), _first(run, "right_wheel_speed")
+    if left is not None and right is not None:
+        return (right[0] - left[0]) * RADIUS / TRACK
+    heading = _first(run, "heading")
+    return heading[1] if heading is not None else 0.0

@@ -1,0 +1,283 @@
+"""Windows simulated, many at once: predictions of every measured channel at every sample."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from mujoco import batch
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from mjchair.diagnosis.chair import State
+from mjchair.diagnosis.study import Run, Study
+from mjchair.diagnosis.windows import LEAD, Window, cut
+from mjchair.effects import rider_sway
+from mjchair.errors import MjchairError
+from mjchair.model.wheels import base_name
+from mjchair.simulation import names
+from mjchair.simulation.channels import channels
+
+Array = NDArray[np.float64]
+ANGLES = ("heading",)  # channels that wrap
+BYTES = 120_000_000  # of recorded sensor data at once
+CONTROL = mujoco.mjtState.mjSTATE_CTRL
+FORCE = mujoco.mjtState.mjSTATE_QFRC_APPLIED
+SMOOTHING = 0.12  # s, half width of the parabola through a measured motion
+THREADS = 2
+
+
+@dataclass
+class Job:
+    """One window of one model.
+
+    Attributes:
+      model: what is simulated. window: which. state: at the window's start, of the base model.
+      force: (steps, nv) generalized force on top, or None.
+    """
+
+    model: mujoco.MjModel
+    window: Window
+    state: State
+    force: Array | None = None
+
+
+@dataclass
+class Outcome:
+    """What a job gave: predictions (rows, channels), and states along the way where asked for."""
+
+    predicted: Array
+    trace: dict[str, Array] = field(default_factory=dict)
+
+
+def stripped(spec: mujoco.MjSpec) -> mujoco.MjSpec:
+    """A copy without what is only seen: bodies have explicit inertials, so nothing else changes."""
+    light = spec.copy()
+    explicit = all(b.explicitinertial for b in light.bodies[1:])
+    for geom in list(light.geoms):
+        if explicit and not geom.contype and not geom.conaffinity:
+            light.delete(geom)
+    return light
+
+
+class Shooter:
+    """Simulates windows of a study's runs.
+
+    Attributes:
+      study, channels, windows: what is simulated. step: of the simulation, s.
+    """
+
+    def __init__(self, study: Study, windows: Sequence[Window] | None = None) -> None:
+        """Cut the runs and tabulate their inputs."""
+        self.study = study
+        self.channels = study.channels
+        self.spec = stripped(study.spec)
+        self.base = self.spec.copy().compile()
+        self.step = float(self.base.opt.timestep)
+        self.windows = list(windows) if windows is not None else cut(study.runs, self.step)
+        longest = max(w.last - w.start for w in self.windows)
+        self.steps = int(np.ceil((longest + LEAD) / self.step)) + 3
+        self._places: dict[int, list[int]] = {}
+        self.motions = [_motion(run) for run in study.runs]
+
+    def compile(self, edit: Callable[[mujoco.MjSpec], None] | None = None) -> mujoco.MjModel:
+        """The base model, edited."""
+        spec = self.spec.copy()
+        if edit is not None:
+            edit(spec)
+        try:
+            return spec.compile()
+        except ValueError as error:
+            line = " ".join(str(error).split())
+            raise MjchairError(f"an effect does not compile: {line}") from None
+
+    def measured(self, window: Window) -> Array:
+        """Samples (rows, channels) of a window, NaN where missing."""
+        trial = self.study.runs[window.run].trial
+        nothing = np.full(window.rows.size, np.nan)
+        return np.column_stack(
+            [
+                trial.channels[c][window.rows] if c in trial.channels else nothing
+                for c in self.channels
+            ]
+        )
+
+    def controls(self, model: mujoco.MjModel, window: Window, steps: int) -> Array:
+        """Controls (steps, nu) of a window: measured torques, and the rider's motion."""
+        time = window.start + float(model.opt.timestep) * np.arange(steps)
+        out = np.zeros((steps, model.nu))
+        inputs = self.study.runs[window.run].trial.inputs
+        known = names.actuators(model)
+        if inputs is not None:
+            for name in inputs.controls:
+                out[:, names.find(name, known, "actuator")] = inputs.at(name, time)
+        if rider_sway.MOTION in known and self.motions[window.run] is not None:
+            place, _ = self.motions[window.run](time)  # type: ignore[misc]
+            out[:, known.index(rider_sway.MOTION)] = place
+        return out
+
+    def run(self, jobs: Sequence[Job], trace: bool = False) -> list[Outcome]:
+        """Simulate the jobs; equal model sizes go together."""
+        outcomes: list[Outcome | None] = [None] * len(jobs)
+        groups: dict[tuple[object, ...], list[int]] = {}
+        for i, job in enumerate(jobs):
+            m = job.model
+            key = (m.nq, m.nv, m.na, m.nu, m.nsensordata, m.neq, m.nsite, m.opt.timestep)
+            groups.setdefault((*key, job.force is None), []).append(i)
+        for members in groups.values():
+            model = jobs[members[0]].model
+            steps = int(round(self.steps * self.step / model.opt.timestep))
+            width = model.nsensordata + (model.nq + model.nv + model.na if trace else 0)
+            size = max(2, int(BYTES / (8 * steps * width)))
+            for at in range(0, len(members), size):
+                chunk = members[at : at + size]
+                for i, outcome in zip(
+                    chunk, self._chunk([jobs[i] for i in chunk], steps, trace), strict=True
+                ):
+                    outcomes[i] = outcome
+        return [o for o in outcomes if o is not None]
+
+    def _chunk(self, jobs: list[Job], steps: int, trace: bool) -> list[Outcome]:
+        models = [_coasting(self.study.runs[j.window.run], j.model) for j in jobs]
+        model = models[0]
+        many = batch.Batch(model, len(jobs), THREADS)
+        many.set_models(models)
+        self._set_states(many, jobs, model)
+        kept: dict[tuple[int, int], Array] = {}
+        rows = []
+        for job, m in zip(jobs, models, strict=True):
+            key = (id(job.window), m.nu)
+            if key not in kept:
+                kept[key] = self.controls(m, job.window, steps)
+            rows.append(kept[key])
+        control, what = np.stack(rows), int(CONTROL)
+        if jobs[0].force is not None:
+            forces = np.stack([_resized(j.force, steps) for j in jobs])
+            control, what = np.concatenate([control, forces], axis=2), what | int(FORCE)
+        record = ["sensordata", *(("qpos", "qvel", "act") if trace else ())]
+        out = many.rollout(steps, control, what, record=record)
+        return [
+            Outcome(
+                self._sampled(model, job.window, out["sensordata"][i]),
+                {k: out[k][i] for k in record[1:]},
+            )
+            for i, job in enumerate(jobs)
+        ]
+
+    def _set_states(self, many: batch.Batch, jobs: list[Job], model: mujoco.MjModel) -> None:
+        qpos, qvel, act = many.bind("qpos"), many.bind("qvel"), many.bind("act")
+        qpos[:] = model.qpos0
+        time = many.bind("time")
+        same = (model.nq, model.nv, model.na) == (self.base.nq, self.base.nv, self.base.na)
+        for i, job in enumerate(jobs):
+            time[i] = job.window.start
+            state = job.state if same else self._fitted_to(model, job)
+            qpos[i], qvel[i], act[i] = state.qpos, state.qvel, state.act
+
+    def _fitted_to(self, model: mujoco.MjModel, job: Job) -> State:
+        """The base state in a model with more joints or activations."""
+        out = State(model.qpos0.copy(), np.zeros(model.nv), np.zeros(model.na))
+        base = self.base
+        for j, name in enumerate(names.joints(model)):
+            free = model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE
+            nq, nv = (7, 6) if free else (1, 1)
+            q, v = model.jnt_qposadr[j], model.jnt_dofadr[j]
+            if name in names.joints(base):
+                k = names.joints(base).index(name)
+                qb, vb = base.jnt_qposadr[k], base.jnt_dofadr[k]
+                out.qpos[q : q + nq] = job.state.qpos[qb : qb + nq]
+                out.qvel[v : v + nv] = job.state.qvel[vb : vb + nv]
+            elif names.same(name, rider_sway.MOTION) and self.motions[job.window.run]:
+                place, speed = self.motions[job.window.run](np.array([job.window.start]))  # type: ignore[misc]
+                out.qpos[q], out.qvel[v] = place[0], speed[0]
+        controls = self.controls(model, job.window, 1)[0]
+        known = names.actuators(base)
+        for a, name in enumerate(names.actuators(model)):
+            at, count = model.actuator_actadr[a], model.actuator_actnum[a]
+            if at < 0:
+                continue
+            k = known.index(name) if name in known else -1
+            if k >= 0 and base.actuator_actnum[k] == count:
+                first = base.actuator_actadr[k]
+                out.act[at : at + count] = job.state.act[first : first + count]
+            else:
+                out.act[at : at + count] = controls[a]
+        return out
+
+    def _sampled(self, model: mujoco.MjModel, window: Window, sensed: Array) -> Array:
+        """Sensor data (steps, nsensordata) at the samples of the window, (rows, channels).
+
+        Row k of the sensor data belongs to the state before step k.
+        """
+        time = self.study.runs[window.run].trial.time[window.rows]
+        at = np.clip((time - window.start) / model.opt.timestep, 0.0, len(sensed) - 1.001)
+        low = at.astype(int)
+        share = (at - low)[:, None]
+        index = self._columns(model)
+        values = sensed[:, index]
+        for i, name in enumerate(self.channels):
+            if name.endswith(ANGLES):
+                values[:, i] = np.unwrap(values[:, i])
+        return np.asarray((1.0 - share) * values[low] + share * values[low + 1])
+
+    def _columns(self, model: mujoco.MjModel) -> list[int]:
+        if model.nsensordata not in self._places:
+            found = {c.name: c.index for c in channels(model)}
+            short = {base_name(n): i for n, i in found.items()}
+            place = [found.get(c, short.get(c, 0)) for c in self.channels]
+            self._places[model.nsensordata] = place
+        return self._places[model.nsensordata]
+
+
+def residual(measured: Array, predicted: Array, channels: Sequence[str]) -> Array:
+    """Measured minus predicted (rows, channels); angles that wrap are brought within half a turn."""
+    out = measured - predicted
+    for i, name in enumerate(channels):
+        if name.endswith(ANGLES):
+            out[:, i] = (out[:, i] + np.pi) % (2.0 * np.pi) - np.pi
+    return out
+
+
+def _resized(force: Array | None, steps: int) -> Array:
+    assert force is not None
+    return (
+        force[:steps] if len(force) >= steps else np.pad(force, ((0, steps - len(force)), (0, 0)))
+    )
+
+
+def _coasting(run: Run, model: mujoco.MjModel) -> mujoco.MjModel:
+    """In a run without torque nothing is driven, so a drive's own braking is off."""
+    if run.trial.inputs is not None:
+        return model
+    known = names.actuators(model)
+    rear = [names.find(w, known, "actuator") for w in ("left_wheel", "right_wheel")]
+    if not model.actuator_biasprm[rear].any():
+        return model
+    off = copy.copy(model)
+    off.actuator_biasprm[rear] = 0.0
+    return off
+
+
+def _motion(run: Run) -> Callable[[Array], tuple[Array, Array]] | None:
+    """The rider's motion and its speed (m, m/s) at any times, smoothed; None: not measured."""
+    values: Mapping[str, Array] = run.trial.other
+    if rider_sway.MOTION not in values:
+        return None
+    there = ~np.isnan(values[rider_sway.MOTION])
+    time, place = run.trial.time[there], values[rider_sway.MOTION][there]
+    if time.size < 8:
+        return None
+    rate = 1.0 / float(np.median(np.diff(time)))
+    grid = np.arange(time[0], time[-1], 1.0 / rate)
+    even = np.interp(grid, time, place)
+    width = min(2 * max(2, round(SMOOTHING * rate)) + 1, 2 * ((even.size - 1) // 2) - 1)
+    smooth = savgol_filter(even, width, 3) if width > 3 else even
+    speed = np.gradient(smooth, grid)
+
+    def at(when: Array) -> tuple[Array, Array]:
+        return np.interp(when, grid, smooth), np.interp(when, grid, speed)
+
+    return at

@@ -1,0 +1,1 @@
+"""Named physical effects, each an edit of an MjSpec."""

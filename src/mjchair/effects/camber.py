@@ -1,0 +1,24 @@
+"""Rear wheels that lean inwards."""
+
+from __future__ import annotations
+
+import mujoco
+
+from mjchair.effects import parts
+from mjchair.effects.effect import Effect, Parameter
+from mjchair.effects.turn import turn_wheel
+
+
+def edit(spec: mujoco.MjSpec, angle: float) -> None:
+    """Lean the tops of both rear wheels inwards by `angle` (rad)."""
+    for wheel, side in parts.SIDE.items():
+        turn_wheel(spec, wheel, (1.0, 0.0, 0.0), side * angle)
+
+
+EFFECT = Effect(
+    name="camber",
+    parameters=(Parameter("angle", "rad", 0.05, -0.3, 0.3),),
+    signature="side force from gamma Fz; cancels between left and right but for load transfer",
+    source="sports chairs up to 20 deg; bent axles a degree or two",
+    edit=edit,
+)

@@ -1,0 +1,118 @@
+"""A sensor that is off: bias, scale or delay of one channel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjchair.effects import parts
+from mjchair.effects.effect import Effect, Parameter
+from mjchair.engine import wheel
+from mjchair.errors import MjchairError
+from mjchair.simulation.channels import TIRE
+
+COMPONENTS = {".x": 0, ".y": 1, ".z": 2} | {f".{part}": k for k, (part, _) in enumerate(TIRE)}
+
+# typical sizes of a fault: (bias, unit) by the end of the channel's sensor name
+SIZES = {
+    "angle": (0.05, "rad"),
+    "speed": (0.1, "rad/s"),
+    "gyro": (0.02, "rad/s"),
+    "accelerometer": (0.2, "m/s^2"),
+    "position": (0.05, "m"),
+    "velocity": (0.05, "m/s"),
+    "heading": (0.05, "rad"),
+    "tire": (5.0, "N"),
+}
+
+
+def split(channel: str) -> tuple[str, int]:
+    """The sensor of a scalar channel, and which of its components it is."""
+    name, dot, end = channel.rpartition(".")
+    return (name, COMPONENTS[dot + end]) if dot and dot + end in COMPONENTS else (channel, 0)
+
+
+def size(channel: str) -> tuple[float, str]:
+    """Typical bias of a channel, and its unit."""
+    name, _ = split(channel)
+    return next((s for end, s in SIZES.items() if name.endswith(end)), (0.1, "?"))
+
+
+def _block(spec: mujoco.MjSpec, channel: str) -> tuple[Any, Any, int]:
+    name, component = split(channel)
+    sensor = parts.named(spec.sensors, name, "sensor")
+    data = np.array(sensor.userdata, dtype=float)
+    if not data.size or data[0] != wheel.SENSOR_TAG:
+        data = np.array([wheel.SENSOR_TAG, float(wheel.PLAIN)])
+    at = wheel.SENSOR_BIAS + 2 * component
+    if data.size < at + 2:
+        data = np.r_[data, np.zeros(at + 2 - data.size)]
+    return sensor, data, at
+
+
+def _bias(channel: str) -> Callable[..., None]:
+    def edit(spec: mujoco.MjSpec, bias: float) -> None:
+        sensor, data, at = _block(spec, channel)
+        data[at] += bias
+        parts.write_sensor(spec, sensor, data)
+
+    return edit
+
+
+def _scale(channel: str) -> Callable[..., None]:
+    def edit(spec: mujoco.MjSpec, scale: float) -> None:
+        sensor, data, at = _block(spec, channel)
+        data[at + 1] = (1.0 + data[at + 1]) * (1.0 + scale) - 1.0
+        parts.write_sensor(spec, sensor, data)
+
+    return edit
+
+
+def _delay(channel: str) -> Callable[..., None]:
+    def edit(spec: mujoco.MjSpec, delay: float) -> None:
+        if delay <= 0.0:
+            return
+        name, _ = split(channel)
+        sensor = parts.named(spec.sensors, name, "sensor")
+        if sensor.type == mujoco.mjtSensor.mjSENS_USER:
+            raise MjchairError(f"MuJoCo delays no user sensor, and {name} is one")
+        sensor.delay += delay
+        sensor.nsample = int(np.ceil(sensor.delay / spec.option.timestep)) + 2
+
+    return edit
+
+
+def sensor_effects(channel: str) -> tuple[Effect, ...]:
+    """sensor_bias, sensor_scale and sensor_delay of one scalar channel."""
+    typical, unit = size(channel)
+    one = "one channel only, and no force is consistent with it"
+    source = "sizes of uncalibrated sensors; assumed"
+    return (
+        Effect(
+            "sensor_bias",
+            (Parameter("bias", unit, typical, -1e3 * typical, 1e3 * typical),),
+            one,
+            source,
+            _bias(channel),
+            channel,
+        ),
+        Effect(
+            "sensor_scale",
+            (Parameter("scale", "1", 0.05, -0.9, 9.0),),
+            one,
+            source,
+            _scale(channel),
+            channel,
+        ),
+        Effect(
+            "sensor_delay",
+            (Parameter("delay", "s", 0.02, 0.0, 0.5),),
+            one + "; its lag grows with the rate of change",
+            source,
+            _delay(channel),
+            channel,
+        ),
+    )

@@ -1,0 +1,23 @@
+"""A slippery (or grippy) floor: the peak of the tire force."""
+
+from __future__ import annotations
+
+import mujoco
+
+from mjchair.effects import parts
+from mjchair.effects.effect import Effect, Parameter
+from mjchair.tire import block
+
+
+def edit(spec: mujoco.MjSpec, factor: float) -> None:
+    """Multiply the peak friction of all tires by `factor` (1)."""
+    parts.scale_tires(spec, block.FRICTION_FACTOR, factor)
+
+
+EFFECT = Effect(
+    name="tire_friction",
+    parameters=(Parameter("factor", "1", 0.4, 0.02, 2.0, 1.0),),
+    signature="the peak only; seen where a tire slides",
+    source="wet or dusty floors 0.2-0.5 against 0.8",
+    edit=edit,
+)

@@ -1,0 +1,86 @@
+"""Imports go one way: a file imports only from floors beneath its own, or from its own."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import mjchair
+
+PACKAGE = Path(mjchair.__file__).parent
+
+# bottom first; those of one row stand side by side and do not know each other
+FLOORS = [
+    ("errors",),
+    ("storage",),
+    ("tire",),
+    ("model",),
+    ("engine",),
+    ("simulation",),
+    ("measurement",),
+    ("identification",),
+    ("effects",),
+    ("diagnosis",),
+    ("report",),
+    ("tasks", "sweep"),
+    ("commands",),
+    ("cli",),
+    ("__init__", "__main__"),
+]
+LEVEL = {name: level for level, row in enumerate(FLOORS) for name in row}
+WITHOUT_MUJOCO = ("errors", "storage", "tire")
+
+
+def floor(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def imports(path: Path):
+    """Modules that a file imports, at its top or inside functions; "x.y" for `from x import y`."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: imports are absolute here"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def floors_of(path: Path) -> set[str]:
+    found = set()
+    for name in imports(path):
+        parts = name.split(".")
+        if parts[0] == "mjchair" and len(parts) > 1:
+            found.add(parts[1] if parts[1] in LEVEL else "__init__")
+    return found
+
+
+FILES = sorted(PACKAGE.rglob("*.py"))
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_imports_go_down(path):
+    own = floor(path)
+    assert own in LEVEL, f"{own} is on no floor: give it one in this file"
+    for other in floors_of(path) - {own}:
+        assert LEVEL[other] < LEVEL[own], f"{own} imports {other}, which is not beneath it"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_the_tire_law_knows_no_engine(path):
+    if floor(path) in WITHOUT_MUJOCO:
+        assert not [name for name in imports(path) if name.split(".")[0] == "mujoco"]
+
+
+def test_no_drawer_for_odds_and_ends():
+    assert not [p for p in FILES if p.stem in ("utils", "util", "helpers", "misc", "common")]
+
+
+def test_importing_sets_no_callback():
+    import subprocess
+    import sys
+
+    code = (
+        "import mjchair, mjchair.cli, mujoco; "
+        "assert mujoco.get_mjcb_act_dyn() is None and mujoco.get_mjcb_sensor() is None"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
