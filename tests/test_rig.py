@@ -141,3 +141,18 @@ def test_an_empty_sweep_and_a_standing_table_are_refused():
         measure(tire(), [])
     with pytest.raises(MjchairError, match="travel"):
         measure(tire(), sweep(), travel=0.0)
+
+
+def test_a_car_tire_of_a_tir_file_runs_on_the_rig(tmp_path):
+    """Beyond the paper's loads cells and guide grow with the load."""
+    from test_mf61 import book
+
+    from mjchair.tire import Tire, write
+
+    numbers = book(LATERAL_STIFFNESS=1e5, LONGITUDINAL_STIFFNESS=3e5)
+    car = Tire("car", "mf61", numbers, relaxation_x=0.0, relaxation_y=0.0, nominal_load=4000.0)
+    write(car, tmp_path / "car.tir")
+    runs = measure(read(tmp_path / "car.tir"), [Point(a, 4000.0, 0.05) for a in (2.0, 8.0)])
+    for run in runs:
+        assert abs(run.force[1] - run.formula[1]) < 1e-3 * 4000.0
+    assert runs[1].force[1] < -3000.0

@@ -190,10 +190,22 @@ def specification(tire: Tire, point: Point, faults: Faults | None = None) -> muj
     spec.body("guide").pos = (0.0, 0.0, radius)
     yaw, roll = -math.radians(point.angle + faults.toe), math.radians(point.camber + faults.camber)
     spec.body("fork").quat = _turned(yaw, roll)
+    _strengthen(spec, max(1.0, point.load / max(LOADS)))
     if point.kappa is not None:
         spec.joint("wheel").armature = HELD
     spec.option.timestep = _timestep(spec)
     return spec
+
+
+def _strengthen(spec: mujoco.MjSpec, factor: float) -> None:
+    """Make cells, guide and wheel heavier for loads beyond the paper's, in proportion."""
+    for tendon in spec.tendons:
+        tendon.stiffness = np.asarray(tendon.stiffness) * factor
+        tendon.damping = np.asarray(tendon.damping) * factor
+    for name in ("guide", "wheel"):
+        body = spec.body(name)
+        body.mass *= factor
+        body.inertia = np.asarray(body.inertia) * factor
 
 
 def mirrored(tire: Tire) -> Tire:
