@@ -9,6 +9,7 @@ For the causes, angles of both signs are measured as well, and the wheel turned 
 import argparse
 import sys
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -50,9 +51,8 @@ def recovery(name: str, seeds: int) -> str:
     )
 
 
-def causes(seeds: int) -> list[str]:
+def causes(seeds: int) -> Iterator[str]:
     tire = read(TIRES / "wheelchair.toml")
-    lines = []
     for design, given in DESIGNS.items():
         for hidden in HIDDEN:
             found: Counter[str] = Counter()
@@ -62,8 +62,7 @@ def causes(seeds: int) -> list[str]:
                 open_ = "/".join(verdict.undecided)
                 found[named + (f", open {open_}" if open_ else "")] += 1
             said = "; ".join(f"{text}: {count}" for text, count in found.most_common())
-            lines.append(f"{design:<26} {next(iter(hidden), 'nothing'):<10} {said}")
-    return lines
+            yield f"{design:<26} {next(iter(hidden), 'nothing'):<10} {said}"
 
 
 def main() -> None:
@@ -76,7 +75,7 @@ def main() -> None:
         print(recovery(name, seeds), flush=True)
     print("hidden                                what the fit says")
     for line in causes(seeds):
-        print(line)
+        print(line, flush=True)
 
 
 if __name__ == "__main__":

@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     like = read_tire(args.like)
     found, verdict = identify(table, args.family, seed=args.seed)
     others = [
-        fit(table, curve(family, table), found.causes, seed=args.seed)
+        fit(table, curve(family, table), found.causes, seed=args.seed, starts=3)
         for family in FAMILIES
         if family != args.family
     ]
@@ -96,7 +96,7 @@ def report(found: Fit, verdict: Verdict, others: list[Fit]) -> str:
     lines += ["", *_undetermined(found, estimates)]
     lines += ["Published coefficients (value and standard error):"]
     lines += [
-        f"  {name:<20} {_rounded(value, error)} +- {error:.1g}"
+        f"  {name:<20} {_rounded(value, error)} +- {error:.2g}"
         for name, (value, error) in found.coefficients().items()
         if error > 0.0
     ]
