@@ -197,3 +197,14 @@ def test_what_a_model_lacks_is_named():
     with pytest.raises(MjchairError, match="unknown joint 'chair'"):
         mjchair.simulate(bare, None, 0.1, initial={"speed": 1.0})
     assert mjchair.simulate(bare, None, 0.1).status is Status.COMPLETED
+
+
+def test_inputs_may_be_constants_or_a_table(tmp_path):
+    spec = mjchair.load_spec()
+    torque = {"left_wheel": 5.0, "right_wheel": 5.0}
+    by_name = mjchair.simulate(spec, torque, 0.2)
+    (tmp_path / "drive.csv").write_text("time,left_wheel,right_wheel\n0,5,5\n0.2,5,5\n")
+    by_table = mjchair.simulate(spec, tmp_path / "drive.csv")
+    assert np.array_equal(by_name.qpos, by_table.qpos)
+    with pytest.raises(mjchair.MjchairError, match="give a duration"):
+        mjchair.simulate(spec, torque)

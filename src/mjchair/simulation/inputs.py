@@ -190,6 +190,25 @@ def read_inputs(path: str | os.PathLike[str], model: mujoco.MjModel) -> Inputs:
     return Inputs(table.time, controls, str(path))
 
 
+def as_inputs(
+    given: Inputs | Mapping[str, float] | str | os.PathLike[str] | None,
+    model: mujoco.MjModel,
+    duration: float | None,
+) -> Inputs | None:
+    """Inputs from what `simulate` takes: inputs, constant controls by name, or a table's path.
+
+    Raises:
+      MjchairError: constant controls without a duration, or as constant and read_inputs do.
+    """
+    if given is None or isinstance(given, Inputs):
+        return given
+    if isinstance(given, Mapping):
+        if duration is None:
+            raise MjchairError("constant controls do not say how long; give a duration in s")
+        return constant(given, duration)
+    return read_inputs(given, model)
+
+
 # Columns of a measured run that are neither an actuator nor a sensor: forward displacement of the
 # rider's centre of mass in the chair frame (m).
 OTHER_COLUMNS = frozenset({"rider_motion"})

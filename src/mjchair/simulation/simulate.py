@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import importlib.metadata
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -21,7 +22,7 @@ from mjchair.model.wheels import check_timestep
 from mjchair.simulation import names
 from mjchair.simulation.channels import channels, control_unit
 from mjchair.simulation.initial import Initial, as_initial, start
-from mjchair.simulation.inputs import Inputs, drivable
+from mjchair.simulation.inputs import Inputs, as_inputs, drivable
 from mjchair.simulation.recording import Recording, Status
 from mjchair.simulation.stored_model import StoredModel
 
@@ -34,7 +35,7 @@ FULL = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
 
 def simulate(
     model: mujoco.MjModel | mujoco.MjSpec,
-    inputs: Inputs | None = None,
+    inputs: Inputs | Mapping[str, float] | str | os.PathLike[str] | None = None,
     duration: float | None = None,
     *,
     initial: Initial | Mapping[str, Any] | None = None,
@@ -56,7 +57,8 @@ def simulate(
     Args:
       model: from mjchair.load_spec, or compiled from that. A spec is the better one to give: its
         recording holds XML, which later versions of MuJoCo read as well.
-      inputs: what drives the chair; None: nothing does.
+      inputs: what drives the chair: Inputs, constant controls by actuator (N m), or the path of
+        a table; None: nothing does.
       duration: s; None: until the inputs end.
       initial: where and how the chair starts, see Initial; None: at rest where the model has it.
       timestep: s; None: the model's.
@@ -77,6 +79,7 @@ def simulate(
         _check_positive("timestep", timestep, "s")
         model.opt.timestep = timestep
         check_timestep(model)
+    inputs = as_inputs(inputs, model, duration)
     every = _steps_a_sample(model.opt.timestep, sample_rate)
     steps = _steps(model.opt.timestep, inputs, duration)
     times = model.opt.timestep * np.arange(steps + 1)
