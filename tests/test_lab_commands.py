@@ -2,11 +2,12 @@
 
 import csv
 import json
+from pathlib import Path
 
 import pytest
 
 from mjchair.cli import main
-from mjchair.tire import read
+from mjchair.tire import read, write
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +65,7 @@ def test_the_report_says_what_is_not_determined(lab):
         (["rig", "--noise", "-1"], "noise is -1"),
         (["rig", "--tire", "linear", "--travel", "0"], "travel is 0"),
         (["fit-tire", "nowhere.csv"], "cannot read nowhere.csv"),
+        (["fit-tire", "nowhere.csv", "--family", "linear", "--format", "tir"], "no family"),
     ],
 )
 def test_bad_input_is_one_line_and_code_2(arguments, message, tmp_path, capsys):
@@ -84,3 +86,22 @@ def test_an_option_that_is_no_number_is_refused(capsys):
 def test_nothing_is_overwritten_without_force(lab, capsys):
     assert main(["rig", "--out", str(lab / "rig")]) == 2
     assert "--force" in capsys.readouterr().err
+
+
+def test_a_fit_of_61_can_be_a_tir_file(lab, tmp_path):
+    table = str(lab / "rig" / "rig.csv")
+    arguments = ["fit-tire", table, "--family", "mf61", "--format", "tir"]
+    assert main([*arguments, "--out", str(tmp_path / "fit")]) == 0
+    tire = read(tmp_path / "fit" / "fitted.tir")
+    assert tire.family == "mf61"
+    assert tire.forces(210.0, 0.0, 0.1745).Fy == pytest.approx(-43.6, abs=2.0)
+
+
+def test_what_a_tire_file_has_besides_is_listed(tmp_path, capsys):
+    known = read(Path(__file__).parents[1] / "models" / "tires" / "wheelchair.toml")
+    path = tmp_path / "more.tir"
+    write(known, path)
+    path.write_text(path.read_text() + "[VERTICAL]\nVERTICAL_STIFFNESS = 2e5\n")
+    arguments = ["rig", "--tire", str(path), "--angles", "5", "--loads", "110"]
+    assert main([*arguments, "--speeds", "0.05", "--out", str(tmp_path / "rig")]) == 0
+    assert "not used of the tire's file: VERTICAL.VERTICAL_STIFFNESS" in capsys.readouterr().out

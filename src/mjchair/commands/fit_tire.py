@@ -7,6 +7,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from mjchair.commands import options
+from mjchair.errors import MjchairError
 
 if TYPE_CHECKING:
     from mjchair.identification.causes import Verdict
@@ -57,6 +58,8 @@ def run(args: argparse.Namespace) -> int:
     from mjchair.tire import write
 
     check_vacant(args.out, args.force)
+    if args.format == "tir" and args.family in ("linear", "quadratic"):
+        raise MjchairError(f".tir files have no family {args.family!r}; leave --format toml")
     table = read_rig(args.table, args.paper_sign)
     like = read_tire(args.like)
     found, verdict = identify(table, args.family, seed=args.seed)

@@ -118,6 +118,8 @@ def run(args: argparse.Namespace) -> int:
     if second and others:
         figure = rig_plots.compared(runs, others, (tire.name, second.name))
         save(figure, folder / "compared.png")
+    if tire.unused:
+        print(f"not used of the tire's file: {', '.join(tire.unused)}")
     print(_summary(runs, tire, folder, faults.noise > 0.0 or any(offset)))
     return 0
 
