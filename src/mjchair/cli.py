@@ -8,10 +8,10 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from mjchair.commands import models, render, simulate, view
+from mjchair.commands import models, render, simulate, sweep, view
 from mjchair.errors import MjchairError
 
-COMMANDS = (simulate, render, view, models)
+COMMANDS = (simulate, render, view, models, sweep)
 BAD_INPUT = 2
 INTERRUPTED = 130  # as shells have it: 128 + SIGINT
 

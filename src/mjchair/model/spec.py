@@ -82,6 +82,15 @@ def load_spec(
     if heights is not None:
         set_heights(spec, heights)
     set_tires(spec, tire)
+    return finished(spec, parameters)
+
+
+def finished(spec: mujoco.MjSpec, parameters: ChairParameters | None = None) -> mujoco.MjSpec:
+    """The specification with a designer's changes, its tires suited to its wheels, and checked.
+
+    Raises:
+      MjchairError: as load_spec does.
+    """
     if parameters is not None:
         parameters.apply(spec)
     compiled = compile_spec(spec)
