@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -31,6 +31,7 @@ from mjchair.sweep.measures import Sensed, standard
 from mjchair.sweep.study import Case, Study
 
 Array = NDArray[np.float64]
+Measure = Callable[[Sensed], Mapping[str, float]]
 
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 BYTES = 150_000_000  # of sensor data recorded at once
@@ -151,27 +152,19 @@ def _batch(
     driven = {name: names.actuators(model).index(name) for name in drivable(model)}
     measure = study.measures or standard
     rows = []
-    for i in range(len(cases)):
-        rows.append(_row(measure, time, sensed[i], control[i], places, driven, bool(broken[i])))
+    for i, case in enumerate(cases):
+        seen = Sensed(
+            time,
+            {name: sensed[i][:, at] for name, at in places.items()},
+            {name: control[i][:, at] for name, at in driven.items()},
+            case,
+        )
+        rows.append(_row(measure, seen, bool(broken[i]) or not np.isfinite(sensed[i, -1]).all()))
     return rows
 
 
-def _row(
-    measure: Any,
-    time: Array,
-    sensed: Array,
-    control: Array,
-    places: Mapping[str, int],
-    driven: Mapping[str, int],
-    broken: bool,
-) -> dict[str, Any]:
+def _row(measure: Measure, seen: Sensed, broken: bool) -> dict[str, Any]:
     """Status and measures of one simulation."""
-    broken = broken or not np.isfinite(sensed[-1]).all()
-    seen = Sensed(
-        time,
-        {name: sensed[:, at] for name, at in places.items()},
-        {name: control[:, at] for name, at in driven.items()},
-    )
     try:
         numbers = {name: float(value) for name, value in measure(seen).items()}
     except KeyError as error:

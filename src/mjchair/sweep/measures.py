@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +19,13 @@ class Sensed:
     Attributes:
       time: (n,), s; sample k of every channel belongs to time[k].
       channels: scalar sensor channels, name -> (n,), SI (see mjchair.simulation.channels).
-      controls: actuator -> (n,); for wheels N m.
+      controls: actuator -> (n,); for wheels N m. case: the values of the case.
     """
 
     time: Array
     channels: Mapping[str, Array]
     controls: Mapping[str, Array]
+    case: Mapping[str, float | int | str] = field(default_factory=dict)
 
     @property
     def step(self) -> float:
