@@ -58,7 +58,8 @@ class ChairParameters:
     """What a designer chooses; None leaves the model as it is. Frozen, validated when made.
 
     Wheels keep their masses when their radius changes, and their inertias go with its square
-    (assumption: a bigger rim of the same make would be a little heavier). The frame stays level:
+    (assumption: a bigger rim of the same make would be a little heavier). Their rolling resistance
+    goes with 1 / radius (Coulomb's law; the lever arm of the load stays). The frame stays level:
     hubs move up and down with the radius.
 
     Attributes:
@@ -152,6 +153,7 @@ def _set_radius(spec: mujoco.MjSpec, wheel: str, radius: float) -> None:
     geom.size = (radius, radius, half * math.sqrt(radius / old))
     tire = np.array(geom.userdata)
     tire[block.RADIUS] = radius
+    tire[block.ROLLING_RESISTANCE] *= old / radius
     geom.userdata = tire
     body.pos = np.add(body.pos, (0.0, 0.0, radius - old))
     body.inertia = np.asarray(body.inertia) * (radius / old) ** 2

@@ -88,6 +88,15 @@ def load_spec(
             raise MjchairError(f"timestep is {timestep:g} s; it must be positive, such as 0.002")
         spec.option.timestep = timestep
     set_tires(spec, tire)
+    return finished(spec, parameters)
+
+
+def finished(spec: mujoco.MjSpec, parameters: ChairParameters | None = None) -> mujoco.MjSpec:
+    """The specification with a designer's changes, its tires suited to its wheels, and checked.
+
+    Raises:
+      MjchairError: as load_spec does.
+    """
     if parameters is not None:
         parameters.apply(spec)
     compiled = compile_spec(spec)
