@@ -4,10 +4,10 @@ What a designer chooses against what the rider pays. Two sweeps of the same 72 c
 
 - rolling: every chair coasts from 1.2 m/s for 4 s on the straight. Drag, which is the energy a
   metre takes, follows from the speed it loses (for the chair's whole mass; the wheels' spin is
-  2 % more and left out).
-- turning: every chair starts at rest with its casters behind and turns on the spot, opposite torques
-  of 5 N m for 2.5 s. The energy a full turn takes is the work of the wheels over the angle turned,
-  less the kinetic energy that it still has.
+  3 % more and left out).
+- turning: every chair starts at rest with its casters behind and turns on the spot, with opposite
+  torques of 5 N m for 2.5 s. The energy a full turn takes is the work of the wheels over the angle
+  turned, less the kinetic energy that it still has.
 
 The floors: hard (the tire files' own rolling resistance) and a low-pile carpet, which adds 0.014 to
 it (assumption, inside the 0.01-0.05 of mjchair's effect `surface_patch`).

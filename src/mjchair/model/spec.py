@@ -199,11 +199,14 @@ def _silent() -> Iterator[None]:
     before, quiet = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
     quiet.logto_console = quiet.logto_file = False
     quiet.set()
+    heard = mujoco.get_mju_user_warning()  # dm_control sets one
+    mujoco.set_mju_user_warning(lambda message: None)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
             yield
     finally:
+        mujoco.set_mju_user_warning(heard)
         before.set()
 
 

@@ -1,0 +1,23 @@
+"""The environment: dm_control's, with bounds also for flat observations."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+
+import numpy as np
+from dm_control.rl import control
+from dm_env import specs
+
+
+class Environment(control.Environment):  # type: ignore[misc]
+    """dm_control's environment, whose flat observation keeps the bounds of its parts."""
+
+    def observation_spec(self) -> OrderedDict[str, specs.BoundedArray]:
+        """Of the task; one bounded array under "observations" where they are flat."""
+        parts = self._task.observation_spec(self._physics)
+        if not self._flat_observation:
+            return parts  # type: ignore[no-any-return]
+        low = np.concatenate([np.broadcast_to(p.minimum, p.shape) for p in parts.values()])
+        high = np.concatenate([np.broadcast_to(p.maximum, p.shape) for p in parts.values()])
+        key = control.FLAT_OBSERVATION_KEY
+        return OrderedDict({key: specs.BoundedArray(low.shape, np.float64, low, high, name=key)})

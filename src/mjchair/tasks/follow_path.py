@@ -1,0 +1,142 @@
+"""Follow a path at a given speed; the floor may slope across it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+from dm_control.utils import rewards
+from numpy.typing import ArrayLike
+
+from mjchair.model.spec import load_spec
+from mjchair.tasks import arena
+from mjchair.tasks.course import Course
+from mjchair.tasks.physics import Physics
+from mjchair.tasks.quantity import Quantity
+from mjchair.tasks.task import ChairTask
+
+TIME_LIMIT = 20.0  # s
+SPEED = 1.0  # m/s
+AHEAD = (0.3, 0.6, 1.0, 1.5)  # m along the path, of the points that are observed
+MARKS = 60
+WIDE = 0.25  # m off the path that still counts as having followed it
+CROSS_SLOPE = 0.04  # rise over run to the chair's left as it starts
+
+
+class FollowPath(ChairTask):
+    """Reward: near the path and at speed along it.
+
+    Attributes:
+      course: the path; a new one each episode unless one was given.
+      progress: arc length of the nearest point, m. worst: largest offset of the episode, m.
+    """
+
+    def __init__(
+        self,
+        random: np.random.RandomState | int | None = None,
+        path: ArrayLike | None = None,
+        speed: float = SPEED,
+    ) -> None:
+        """Take a path (k, 2), m, that starts near the origin along +x; None: a random one."""
+        self.given = None if path is None else Course(path)
+        self.course = self.given or Course([(0, 0), (1, 0), (2, 0)])
+        self.speed, self.progress, self.worst = speed, 0.0, 0.0
+        super().__init__(random=random)
+
+    def own_quantities(self) -> tuple[Quantity, ...]:
+        """The path as the chair sees it."""
+        return (
+            Quantity("offset", "m", -3.0, 3.0, "of the axle, to the left of the path", self.offset),
+            Quantity(
+                "direction",
+                "rad",
+                -math.pi,
+                math.pi,
+                "heading of the chair from the path's direction",
+                self.direction,
+            ),
+            Quantity(
+                "path_ahead",
+                "m",
+                -10.0,
+                10.0,
+                "points 0.3, 0.6, 1.0 and 1.5 m ahead on the path, in the chair frame: x, y each",
+                self.path_ahead,
+                2 * len(AHEAD),
+            ),
+        )
+
+    def begin(self, physics: Physics) -> None:
+        """A new path, the chair near its start."""
+        self.course = self.new_course()
+        super().begin(physics)
+        self.progress = self.worst = 0.0
+        arena.draw(physics, self.course.points)
+
+    def new_course(self) -> Course:
+        """The path of an episode: the one given, or another one from the task's random state."""
+        return self.given or Course(random_path(self.random))
+
+    def after_step(self, physics: Physics) -> None:
+        """Find the nearest point of the path again."""
+        self.progress = self.course.nearest(physics.position(), self.progress)
+        self.worst = max(self.worst, abs(self.offset(physics)))
+        super().after_step(physics)
+
+    def offset(self, physics: Physics) -> float:
+        """To the left of the path, m."""
+        return self.course.offset(physics.position(), self.progress)
+
+    def direction(self, physics: Physics) -> float:
+        """Of the chair from the path, rad."""
+        turn = physics.heading() - self.course.at(self.progress)[1]
+        return math.remainder(turn, 2.0 * math.pi)
+
+    def path_ahead(self, physics: Physics) -> np.ndarray:
+        """Points ahead in the chair frame, m."""
+        points = [self.course.at(self.progress + s)[0] for s in AHEAD]
+        return np.concatenate([physics.from_chair(point) for point in points])
+
+    def get_reward(self, physics: Physics) -> float:
+        """In [0, 1]."""
+        if self.at_end():
+            return 1.0
+        near = rewards.tolerance(self.offset(physics), (-0.05, 0.05), margin=0.5)
+        along = physics.speed() * math.cos(self.direction(physics))
+        quick = rewards.tolerance(
+            along, (0.9 * self.speed, 1.2 * self.speed), margin=self.speed, sigmoid="linear"
+        )
+        return float(near * quick)
+
+    def at_end(self) -> bool:
+        """Whether the end of the path is reached."""
+        return self.progress > self.course.length - 0.1
+
+    def get_termination(self, physics: Physics) -> float | None:
+        """At the end of the path; or as every task, with discount 0."""
+        ended = super().get_termination(physics)
+        return 1.0 if ended is None and self.at_end() else ended
+
+    def solved(self, physics: Physics) -> bool:
+        """At the end, and never more than 0.25 m off."""
+        return self.at_end() and self.worst < WIDE
+
+
+def random_path(random: np.random.RandomState) -> np.ndarray:
+    """Points (k, 2), m, of a winding path of some 10 m that starts along +x."""
+    points, heading = [(0.0, 0.0), (0.8, 0.0)], 0.0
+    for _ in range(8):
+        heading += random.uniform(-0.75, 0.75)
+        x, y = points[-1]
+        points.append((x + 1.2 * math.cos(heading), y + 1.2 * math.sin(heading)))
+    return np.array(points)
+
+
+def spec(**options: Any) -> mujoco.MjSpec:
+    """The manual chair on a floor that slopes across the start, by turned gravity."""
+    chosen = {"scene": "cross_slope", "grade": CROSS_SLOPE, "tilt": "gravity", **options}
+    built = load_spec(**chosen)
+    arena.add_marks(built, MARKS)
+    return built
