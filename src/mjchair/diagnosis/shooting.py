@@ -14,10 +14,10 @@ from scipy.signal import savgol_filter
 
 from mjchair.diagnosis.chair import State
 from mjchair.diagnosis.study import Run, Study
-from mjchair.diagnosis.windows import LEAD, Window, cut
+from mjchair.diagnosis.windows import Window, cut
 from mjchair.effects import rider_sway
 from mjchair.errors import MjchairError
-from mjchair.model.wheels import base_name
+from mjchair.model.wheels import base_name, check_timestep
 from mjchair.simulation import names
 from mjchair.simulation.channels import channels
 
@@ -79,15 +79,30 @@ class Shooter:
         self.step = float(self.base.opt.timestep)
         self.windows = list(windows) if windows is not None else cut(study.runs, self.step)
         longest = max(w.last - w.start for w in self.windows)
-        self.steps = int(np.ceil((longest + LEAD) / self.step)) + 3
+        self.steps = int(np.ceil(longest / self.step)) + 3
+        self.coarse = self._coarse_step()
         self._places: dict[int, list[int]] = {}
         self.motions = [_motion(run) for run in study.runs]
 
-    def compile(self, edit: Callable[[mujoco.MjSpec], None] | None = None) -> mujoco.MjModel:
-        """The base model, edited."""
+    def _coarse_step(self) -> float:
+        """Twice the step where the tires allow it: enough for differences of two simulations."""
+        model = copy.copy(self.base)
+        model.opt.timestep = 2.0 * self.step
+        try:
+            check_timestep(model)
+        except MjchairError:
+            return self.step
+        return 2.0 * self.step
+
+    def compile(
+        self, edit: Callable[[mujoco.MjSpec], None] | None = None, coarse: bool = False
+    ) -> mujoco.MjModel:
+        """The base model, edited; `coarse` for differences."""
         spec = self.spec.copy()
         if edit is not None:
             edit(spec)
+        if coarse:
+            spec.option.timestep *= self.coarse / self.step
         try:
             return spec.compile()
         except ValueError as error:
@@ -129,7 +144,7 @@ class Shooter:
             groups.setdefault((*key, job.force is None), []).append(i)
         for members in groups.values():
             model = jobs[members[0]].model
-            steps = int(round(self.steps * self.step / model.opt.timestep))
+            steps = int(np.ceil(self.steps * self.step / model.opt.timestep)) + 1
             width = model.nsensordata + (model.nq + model.nv + model.na if trace else 0)
             size = max(2, int(BYTES / (8 * steps * width)))
             for at in range(0, len(members), size):

@@ -5,6 +5,7 @@ The fast part of the state is handed from window to window by the simulation its
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import mujoco
@@ -83,6 +84,8 @@ def track(
         model that is not far; one round is enough then.
     """
     chair = Chair(shooter.base)
+    coarse = copy.copy(model)
+    coarse.opt.timestep *= shooter.coarse / shooter.step
     white = np.array([noise[c].total for c in shooter.channels])
     observer = observer or Observer(shooter.channels)
     count = len(shooter.windows)
@@ -108,7 +111,15 @@ def track(
             rounds = ROUNDS if before is None else 1
             for _ in range(rounds):
                 _fit_round(
-                    shooter, chair, model, observer, members, states, white, predicted, slow
+                    shooter,
+                    chair,
+                    (model, coarse),
+                    observer,
+                    members,
+                    states,
+                    white,
+                    predicted,
+                    slow,
                 )
             jobs = [Job(model, shooter.windows[i], _some(states[i])) for i in members]
             for i, outcome in zip(members, shooter.run(jobs, trace=True), strict=True):
@@ -131,7 +142,7 @@ def _slow_of(chair: Chair, known: State, running: State | None) -> State:
 def _fit_round(
     shooter: Shooter,
     chair: Chair,
-    model: mujoco.MjModel,
+    models: tuple[mujoco.MjModel, mujoco.MjModel],
     observer: Observer,
     members: list[int],
     states: list[State | None],
@@ -142,18 +153,18 @@ def _fit_round(
     jobs = []
     for i in members:
         state, w = _some(states[i]), shooter.windows[i]
-        jobs.append(Job(model, w, state))
+        jobs += [Job(models[0], w, state), Job(models[1], w, state)]
         jobs += [
-            Job(model, w, chair.moved(state, STEPS[k] * np.eye(len(SLOW))[k]))
+            Job(models[1], w, chair.moved(state, STEPS[k] * np.eye(len(SLOW))[k]))
             for k in range(len(SLOW))
         ]
     outcomes = shooter.run(jobs)
-    each = 1 + len(SLOW)
+    each = 2 + len(SLOW)
     for n, i in enumerate(members):
         w = shooter.windows[i]
         seen = [observer.observe(shooter, w, o.predicted) for o in outcomes[n * each : n * each + each]]
         predicted[i] = seen[0]
-        slow[i] = np.stack([s - seen[0] for s in seen[1:]], axis=2)
+        slow[i] = np.stack([s - seen[1] for s in seen[2:]], axis=2)
         miss = residual(shooter.measured(w), seen[0], shooter.channels)
         there = ~np.isnan(miss)
         columns = np.concatenate([slow[i], _free_columns(shooter)[None].repeat(len(miss), 0)], 2)
