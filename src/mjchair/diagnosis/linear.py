@@ -46,7 +46,8 @@ class System:
     Attributes:
       names: of the columns. nuisance: how many of them, at the start, are nuisances with unit
         prior. G: (windows, p, p). b: (windows, p). c: (windows,) chi2 of the residual.
-      cells: slow parts. run: (windows,) index of the run.
+      cells: slow parts. run: (windows,) index of the run. back: (nuisance,) where the model
+        already stands from the centre of its priors, in standard deviations.
     """
 
     names: list[str]
@@ -56,6 +57,7 @@ class System:
     c: Array
     cells: list[Cells]
     run: NDArray[np.int64]
+    back: Array
 
     def index(self, names: Sequence[str]) -> list[int]:
         """Places of columns."""
@@ -128,6 +130,7 @@ def build(
     columns: dict[str, list[Array]],
     nuisance: int,
     whitener: Whitener | None = None,
+    offsets: dict[str, float] | None = None,
 ) -> System:
     """Eliminate every window's slow state and form the products.
 
@@ -153,7 +156,8 @@ def build(
         c[i] = r @ r - Zr @ cho_solve(factor, Zr)
         cells.append(_cells(white.sizes(i), w.last - w.first, r, Z, factor))
     run = np.array([w.run for w in shooter.windows])
-    return System(names, nuisance, G, b, c, cells, run)
+    back = np.array([(offsets or {}).get(n, 0.0) for n in names[:nuisance]])
+    return System(names, nuisance, G, b, c, cells, run, back)
 
 
 def basis(sizes: Sequence[int], span: float) -> list[Array]:
@@ -230,12 +234,22 @@ class Reduced:
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(unit))) / scale)
 
 
-def reduce(system: System, windows: Sequence[int] | NDArray[np.int64]) -> Reduced:
-    """Sum over the windows and eliminate the nuisances (unit prior)."""
+def reduce(
+    system: System, windows: Sequence[int] | NDArray[np.int64], free: int = 0
+) -> Reduced:
+    """Sum over the windows and eliminate the nuisances (unit prior).
+
+    Args:
+      free: how many of the nuisances, the last ones, have no prior: effects already accepted.
+    """
     w = list(windows)
     n = system.nuisance
     G, b = system.G[w].sum(axis=0), system.b[w].sum(axis=0)
-    inner = cho_factor(G[:n, :n] + np.eye(n))
+    b[:n] -= system.back
+    precision = np.ones(n)
+    if free:
+        precision[n - free :] = 1e-8 * np.diag(G)[n - free : n]
+    inner = cho_factor(G[:n, :n] + np.diag(precision + 1e-12))
     cross = G[:n, n:]
     return Reduced(
         system.names[n:],
@@ -251,8 +265,10 @@ def fit(system: System, windows: Sequence[int] | NDArray[np.int64], which: Seque
     G = system.G[w].sum(axis=0)[np.ix_(use, use)]
     scale = np.sqrt(np.maximum(np.diag(G), 1e-300))
     precision = np.r_[np.ones(n), 1e-8 * scale[n:] ** 2]
+    b = system.b[w].sum(axis=0)[use]
+    b[:n] -= system.back
     out = np.zeros(len(system.names))
-    out[use] = np.linalg.solve(G + np.diag(precision), system.b[w].sum(axis=0)[use])
+    out[use] = np.linalg.solve(G + np.diag(precision), b)
     return out
 
 
