@@ -65,10 +65,10 @@ def _slalom(t: float) -> tuple[float, float]:
 
 
 def _stop_and_go(t: float) -> tuple[float, float]:
-    if t < 1.0:
-        return 0.0, 0.0
-    base = 8.0 if (t - 1.0) % 3.0 < 1.5 else -3.0
-    return base + 2.5 * np.sin(1.7 * t), base - 2.5 * np.sin(1.7 * t)
+    # ramps of 0.1 s: a table at RATE must be able to tell its torque
+    on = 0.5 * (1.0 + np.tanh((t - 1.0) / 0.05))
+    base = 2.5 + 5.5 * np.tanh(np.sin(2.0 * np.pi * (t - 1.0) / 3.0) / 0.2)
+    return on * (base + 2.5 * np.sin(1.7 * t)), on * (base - 2.5 * np.sin(1.7 * t))
 
 
 MANOEUVRES = (

@@ -97,6 +97,12 @@ def nuisance_columns(bench: Bench, found: Track, fit: Fit) -> dict[str, Column]:
     columns = sensitivity.differences(bench.shooter, found, points, fit.edit, observer)
     names = [*(n.name for n in mechanical), "half_step", "integrator"]
     out = dict(zip(names, columns, strict=True))
+    late = 0.5 * bench.shooter.input_step()
+    if late > 0.0 and found.coarse is not None:
+        # a torque that changes between two samples is known to within half of their distance
+        model = bench.shooter.compile(fit.edit, coarse=True)
+        shifted = sensitivity.predictions(bench.shooter, found, model, observer, late)
+        out["input_timing"] = [a - b for a, b in zip(shifted, found.coarse, strict=True)]
     for n in bench.nuisances:
         if n.edit is None:
             out[n.name] = sensitivity.sensor_column(
@@ -181,21 +187,33 @@ def solve(system: System, windows: NDArray[np.int64]) -> Array:
     """Coefficients (p,) of all columns."""
     n, back = system.nuisance, system.back
     G, b = system.G[windows].sum(axis=0), system.b[windows].sum(axis=0)
-    scale = np.sqrt(np.maximum(np.diag(G), 1e-300))
-    precision = np.r_[np.ones(n), 1e-8 * scale[n:] ** 2]
+    size = np.maximum(np.diag(G), 1e-12)
+    precision = np.r_[np.ones(n), 1e-8 * size[n:]]
     b = b - np.r_[back, np.zeros(len(b) - n)]
     return np.asarray(np.linalg.solve(G + np.diag(precision), b))
 
 
-def refit(bench: Bench, start: Fit, before: Track | None, rounds: int = 2) -> Fitted:
-    """Nonlinear fit of nuisances and effects within bounds, by Gauss-Newton."""
+def refit(
+    bench: Bench,
+    start: Fit,
+    before: Track | None,
+    nuisances: dict[str, Column] | None = None,
+    rounds: int = 2,
+) -> Fitted:
+    """Nonlinear fit of nuisances and effects within bounds, by Gauss-Newton.
+
+    Args:
+      start: where to begin. before: a track of a chair that is not far.
+      nuisances: columns to use throughout; None: made anew in every round. They change little, and
+        the residual, which decides where the fit ends, is always new.
+    """
     fit = start
     found = before
     shooter = bench.shooter
     for turn in range(rounds + 1):
         model = shooter.compile(fit.edit)
         found = track(shooter, model, bench.noise, fit.observer(shooter.channels), found)
-        columns = nuisance_columns(bench, found, fit)
+        columns = dict(nuisances or nuisance_columns(bench, found, fit))
         count = len(columns)
         columns.update(term_columns(bench, found, fit))
         system = linear.build(
@@ -224,10 +242,11 @@ def refit(bench: Bench, start: Fit, before: Track | None, rounds: int = 2) -> Fi
 def _spread(system: System, windows: NDArray[np.int64]) -> Array:
     n = system.nuisance
     G = system.G[windows].sum(axis=0)
-    scale = np.sqrt(np.maximum(np.diag(G), 1e-300))
-    precision = np.r_[np.ones(n), 1e-10 * scale[n:] ** 2]
-    unit = (G + np.diag(precision)) / np.outer(scale, scale)
-    return np.asarray(np.sqrt(np.maximum(np.diag(np.linalg.pinv(unit)), 0.0)) / scale)
+    size = np.maximum(np.diag(G), 1e-12)
+    full = G + np.diag(np.r_[np.ones(n), 1e-8 * size[n:]])
+    scale = np.sqrt(np.diag(full))
+    inverse = np.linalg.inv(full / np.outer(scale, scale))
+    return np.asarray(np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale)
 
 
 def _term(fit: Fit, key: str) -> tuple[Term, str]:

@@ -34,7 +34,7 @@ def drivers(bench: Bench, track: Track) -> list[dict[str, Array]]:
     swivel (rad, mean of the casters), left and right torque (N m), time (s).
     """
     shooter = bench.shooter
-    chair = Chair(shooter.base)
+    chair = shooter.chair
     out = []
     for w, trace in zip(shooter.windows, track.trace, strict=True):
         qpos, qvel = trace["qpos"], trace["qvel"]

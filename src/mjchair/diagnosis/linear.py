@@ -21,6 +21,7 @@ from mjchair.diagnosis.tracking import Track, prior
 Array = NDArray[np.float64]
 BAND = 2.0  # Hz, below which a residual is looked at in cells
 RIDGE = 1e-9
+SEEN = 1e-4  # share of a column that must survive the elimination
 
 
 @dataclass
@@ -118,7 +119,7 @@ def slow_columns(shooter: Shooter, track: Track, window: int) -> tuple[Array, Ar
     free = np.zeros((rows, len(shooter.channels), len(angles)))
     for k, i in enumerate(angles):
         free[:, i, k] = 1.0
-    spread = np.r_[prior(shooter, window) / STEPS, np.full(len(angles), 1e4)]
+    spread = np.r_[prior(shooter, window, track.states[window]) / STEPS, np.full(len(angles), 1e4)]
     assert dynamic.shape[2] == len(SLOW)
     return np.concatenate([dynamic, free], axis=2), 1.0 / spread**2
 
@@ -143,6 +144,7 @@ def build(
     count = len(shooter.windows)
     G, b, c = np.zeros((count, p, p)), np.zeros((count, p)), np.zeros(count)
     cells = []
+    raw = np.zeros(p)
     for i, w in enumerate(shooter.windows):
         miss = residual(shooter.measured(w), track.predicted[i], shooter.channels)
         r = white(i, np.nan_to_num(miss)[:, :, None])[:, 0]
@@ -153,8 +155,13 @@ def build(
         Zr, ZJ = Z.T @ r, Z.T @ J
         G[i] = J.T @ J - ZJ.T @ cho_solve(factor, ZJ)
         b[i] = J.T @ r - ZJ.T @ cho_solve(factor, Zr)
+        raw += (J * J).sum(axis=0)
         c[i] = r @ r - Zr @ cho_solve(factor, Zr)
         cells.append(_cells(white.sizes(i), w.last - w.first, r, Z, factor))
+    # what a free initial state takes away whole is nothing but rounding afterwards
+    hidden = G.sum(axis=0).diagonal() < SEEN * raw
+    hidden[:nuisance] = False
+    G[:, hidden, :], G[:, :, hidden], b[:, hidden] = 0.0, 0.0, 0.0
     run = np.array([w.run for w in shooter.windows])
     back = np.array([(offsets or {}).get(n, 0.0) for n in names[:nuisance]])
     return System(names, nuisance, G, b, c, cells, run, back)
@@ -263,8 +270,8 @@ def fit(system: System, windows: Sequence[int] | NDArray[np.int64], which: Seque
     w, n = list(windows), system.nuisance
     use = [*range(n), *which]
     G = system.G[w].sum(axis=0)[np.ix_(use, use)]
-    scale = np.sqrt(np.maximum(np.diag(G), 1e-300))
-    precision = np.r_[np.ones(n), 1e-8 * scale[n:] ** 2]
+    size = np.maximum(np.diag(G), 1e-12)
+    precision = np.r_[np.ones(n), 1e-8 * size[n:]]
     b = system.b[w].sum(axis=0)[use]
     b[:n] -= system.back
     out = np.zeros(len(system.names))

@@ -51,8 +51,10 @@ def differences(
     columns = []
     with installed():
         if any(not point.fine for point in points):
-            base = shooter.compile(base_edit, coarse=True)
-            coarse = predictions(shooter, track, base, seen)
+            if track.coarse is None or seen != track.seen:
+                base = shooter.compile(base_edit, coarse=True)
+                track.coarse, track.seen = predictions(shooter, track, base, seen), seen
+            coarse = track.coarse
         for point in points:
 
             def edit(spec: mujoco.MjSpec, point: Point = point) -> None:
@@ -71,10 +73,14 @@ def differences(
 
 
 def predictions(
-    shooter: Shooter, track: Track, model: mujoco.MjModel, observer: Observer
+    shooter: Shooter,
+    track: Track,
+    model: mujoco.MjModel,
+    observer: Observer,
+    late: float = 0.0,
 ) -> Column:
-    """What a model predicts from the states of a track."""
-    jobs = [Job(model, w, s) for w, s in zip(shooter.windows, track.states, strict=True)]
+    """What a model predicts from the states of a track, with its inputs `late` (s)."""
+    jobs = [Job(model, w, s, late=late) for w, s in zip(shooter.windows, track.states, strict=True)]
     return [
         observer.observe(shooter, w, o.predicted)
         for w, o in zip(shooter.windows, shooter.run(jobs), strict=True)
@@ -174,7 +180,7 @@ def pulse_columns(
     Fx and Fy act along the chair's axes at the ground below the axle, Mz about its vertical, the
     wheels' torques about their axles.
     """
-    chair = Chair(shooter.base)
+    chair = shooter.chair
     out = []
     model = shooter.compile(base_edit, coarse=True)
     with installed():

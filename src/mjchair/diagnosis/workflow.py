@@ -229,7 +229,7 @@ def _refit(base: Base, hypothesis: Hypothesis, say: Say) -> Fitted:
     say("fit of " + " and ".join(hypothesis.keys))
     terms = selection.terms(base.reduced, hypothesis)
     start = replace(base.fit, terms=terms)
-    return refit(base.bench, start, base.track)
+    return refit(base.bench, start, base.track, base.nuisances)
 
 
 def _plain(base: Base) -> float:
