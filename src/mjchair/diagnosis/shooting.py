@@ -19,7 +19,7 @@ from mjchair.diagnosis.windows import Window, cut
 from mjchair.effects import rider_sway
 from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
-from mjchair.model.wheels import base_name, check_timestep
+from mjchair.model.wheels import COMFORTABLE, base_name, cut_damping, check_timestep
 from mjchair.simulation import names
 from mjchair.simulation.channels import channels
 
@@ -114,7 +114,10 @@ class Shooter:
         if coarse:
             spec.option.timestep *= self.coarse / self.step
         try:
-            return spec.compile()
+            model = spec.compile()
+            if coarse:
+                cut_damping(model, above=COMFORTABLE)  # also under more than the nominal load
+            return model
         except ValueError as error:
             line = " ".join(str(error).split())
             raise MjchairError(f"an effect does not compile: {line}") from None

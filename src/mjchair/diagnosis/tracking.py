@@ -18,6 +18,7 @@ from mjchair.diagnosis.noise import Noise
 from mjchair.diagnosis.observe import Observer
 from mjchair.diagnosis.shooting import Job, Shooter, residual
 from mjchair.engine.install import installed
+from mjchair.model.wheels import COMFORTABLE, cut_damping
 from mjchair.simulation import names
 from mjchair.simulation.initial import start
 
@@ -99,6 +100,7 @@ def track(
     chair = shooter.chair
     coarse = copy.copy(model)
     coarse.opt.timestep *= shooter.coarse / shooter.step
+    cut_damping(coarse, above=COMFORTABLE)
     white = np.array([noise[c].total for c in shooter.channels])
     observer = observer or Observer(shooter.channels)
     count = len(shooter.windows)

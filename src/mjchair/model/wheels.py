@@ -167,16 +167,19 @@ def check_timestep(model: mujoco.MjModel, found: list[Wheel] | None = None) -> N
             )
 
 
-def cut_damping(model: mujoco.MjModel) -> None:
+def cut_damping(model: mujoco.MjModel, above: float = 2.0 * COMFORTABLE) -> None:
     """Cut the damping times of tires on wheels too light for them, in the model's blocks.
 
     A tire that suits a rear wheel is often put on the casters as well. Its stiffness is physics;
     its damping is assumed, and settles the chair at standstill only.
+
+    Args:
+      above: the stability number from which damping is cut.
     """
     h = model.opt.timestep
     for wheel, spring in springs(model):
         spare = max(COMFORTABLE - spring.stiffness * h * h / spring.inertia, LEAST)
-        if spring.number(h) > 2.0 * COMFORTABLE:
+        if spring.number(h) > above:
             most = 0.5 * spare * spring.inertia / (h * spring.stiffness)
             wheel.block[spring.damping_time] = min(most, wheel.block[spring.damping_time])
 
