@@ -198,3 +198,43 @@ def test_a_wheel_that_creeps_at_an_angle_reaches_its_kinematic_slip():
             block, u, w, r, 300.0, 0.0, 2e-3, 0.0, 2e-3 * slip, 0.0066, 0.0, 0.3, 0.0, 1.0, 0.1
         )
     assert tan_alpha == pytest.approx(slip, rel=1e-3)
+
+
+def test_plain_python_and_compiled_code_agree():
+    wheel = tire()
+    block = wheel.block()
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        fz, kappa, alpha = rng.uniform(100, 6000), rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5)
+        gamma, speed = rng.uniform(-0.1, 0.1), rng.uniform(0.1, 30.0)
+        plain = law.steady_forces(
+            block, fz, kappa, np.tan(alpha), gamma, speed, 1.0, 1.0, wheel.radius, 1.0
+        )
+        fx, fy, mz, mx, my = wheel.forces(fz, kappa, alpha, gamma, speed)
+        assert np.allclose(plain, (fx, fy, mx, my, mz), rtol=1e-12, atol=1e-9)
+
+
+def test_a_tir_tire_drives_the_chair_in_the_native_callback():
+    import mujoco
+
+    import mjchair
+
+    numbers = book(LATERAL_STIFFNESS=1e5, LONGITUDINAL_STIFFNESS=3e5)
+    car = Tire(
+        "car",
+        "mf61",
+        numbers,
+        relaxation_x=0.0,
+        relaxation_y=0.0,
+        nominal_load=4000.0,
+        damping_time=0.001,
+    )
+    model = mjchair.load_spec("manual", tire=car).compile()
+    data = mujoco.MjData(model)
+    with mjchair.installed():
+        mujoco.mj_step(model, data, 250)
+        data.ctrl[:2] = 8.0
+        mujoco.mj_step(model, data, 1000)
+        assert np.isfinite(data.qpos).all()
+        assert data.body("chair").xpos[0] > 0.2
+        assert data.sensor("left_wheel_tire").data[0] > 1.0

@@ -76,6 +76,14 @@ def columns(model, prefix):
     return 1 + qpos, 1 + model.nq + model.nv + act
 
 
+@pytest.mark.parametrize("prefix", ["a/", "chair1_"])
+def test_names_are_found_behind_any_prefix(prefix):
+    parent = mujoco.MjSpec()
+    parent.attach(mjchair.load_spec("manual"), prefix=prefix, frame=parent.worldbody.add_frame())
+    run = mjchair.simulate(parent.compile(), {"left_wheel": 5.0, "right_wheel": 5.0}, 0.3)
+    assert run["position.x"][-1] > 0.0
+
+
 def test_attached_under_a_prefix_is_the_same_chair(manual, reference):
     parent = mujoco.MjSpec()
     parent.option.timestep = manual.opt.timestep

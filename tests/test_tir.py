@@ -129,6 +129,26 @@ def test_pac89_files_read_in_kn_and_are_written_back(tmp_path):
     assert read(tmp_path / "newton.tir") == newton
 
 
+def test_files_as_other_programs_write_them_read(tmp_path):
+    """PAC2002 without FITTYP or combined slip; MF_05 whose slip range has no driving side."""
+    head = HEAD.replace("FITTYP = {fit} ", "PROPERTY_FILE_FORMAT ='PAC2002' ")
+    ranges = (
+        "[SLIP_ANGLE_RANGE]\nALPMIN = -1.5708 $Minimum\nALPMAX = 1.5708\n"
+        "[LONG_SLIP_RANGE]\nKPUMIN = -0.80000\nKPUMAX = 0.00000 $Maximum valid wheel slip\n"
+    )
+    bare = {name: 0.0 for name in BOOK if name[0] == "R"}
+    tire = read(put(tmp_path, text(head=head, **bare) + ranges))
+    assert tire.family == "mf52"
+    assert tire.forces(4000.0, 0.05, 0.0).Fx > 2000.0
+    assert abs(tire.forces(4000.0, 0.0, 1.4).Fy) > 2000.0
+    both = tire.forces(4000.0, 0.3, 0.3)
+    assert np.hypot(both.Fx, both.Fy) < 1.3 * 4000.0
+    write(tire, tmp_path / "again.tir")
+    assert read(tmp_path / "again.tir") == tire
+    swift = head.replace("'PAC2002'", "'MF_05'\nFITTYP = 5")
+    assert read(put(tmp_path, text(head=swift) + ranges)).family == "mf52"
+
+
 def cut(at):
     whole = text()
     return whole[: int(at * len(whole))]

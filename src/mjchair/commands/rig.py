@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from mjchair.commands import options
 from mjchair.errors import MjchairError
 
 if TYPE_CHECKING:
@@ -56,29 +57,34 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
         "--turned", action="store_true", help="measure with the wheel turned round as well"
     )
     faults = parser.add_argument_group("what is wrong with the rig (hidden from its table)")
-    faults.add_argument("--toe", type=float, default=0.0, metavar="DEG", help="of the mounting")
-    faults.add_argument("--hidden-camber", type=float, default=0.0, metavar="DEG")
     faults.add_argument(
-        "--cell-offset", type=float, default=0.0, metavar="N", help="of both lateral cells"
+        "--toe", type=options.number, default=0.0, metavar="DEG", help="of the mounting"
+    )
+    faults.add_argument("--hidden-camber", type=options.number, default=0.0, metavar="DEG")
+    faults.add_argument(
+        "--cell-offset", type=options.number, default=0.0, metavar="N", help="of both lateral cells"
     )
     faults.add_argument(
-        "--noise", type=float, default=0.0, metavar="PART", help="of the largest force, as 0.02"
+        "--noise",
+        type=options.number,
+        default=0.0,
+        metavar="PART",
+        help="of the largest force, as 0.02",
     )
     faults.add_argument("--seed", type=int, default=0, help="of the noise")
     parser.add_argument(
-        "--travel", type=float, default=9.0, help="relaxation lengths; default: %(default)s"
+        "--travel",
+        type=options.number,
+        default=9.0,
+        help="relaxation lengths; default: %(default)s",
     )
-    parser.add_argument("--out", metavar="DIR", default="out/rig", help="default: %(default)s")
-    parser.add_argument("--force", action="store_true", help="write into a folder that has files")
+    options.add_output(parser, "out/rig")
     parser.set_defaults(run=run)
 
 
 def numbers(text: str) -> list[float]:
     """Finite numbers with commas between them."""
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not numbers such as 0,5,10") from None
+    return [options.number(part) for part in text.split(",")]
 
 
 def run(args: argparse.Namespace) -> int:
@@ -86,30 +92,34 @@ def run(args: argparse.Namespace) -> int:
     from mjchair.measurement.rig import write_rows
     from mjchair.model.spec import read_tire
     from mjchair.report import rig_plots
+    from mjchair.report.plots import save
     from mjchair.simulation.rig import Faults, measure
-    from mjchair.storage import output_folder
+    from mjchair.storage import check_vacant, output_folder
 
+    check_vacant(args.out, args.force)
     tire = read_tire(args.tire)
     second = read_tire(args.against) if args.against else None
     points = _points(args)
     offset = (args.cell_offset, args.cell_offset, 0.0)
     faults = Faults(args.toe, args.hidden_camber, offset, args.noise, args.seed)
-    folder = output_folder(args.out, args.force)
     runs = measure(tire, points, faults, travel=args.travel, progress=_bar)
+    others = second and measure(second, points, faults, travel=args.travel, progress=_bar)
+    folder = output_folder(args.out, args.force)
     write_rows(folder / "rig.csv", HEADER, [_row(run) for run in runs])
     write_rows(folder / "traces.csv", _TRACE_HEADER, _trace_rows(runs))
-    rig_plots.save(rig_plots.traces(runs), folder / "traces.png")
+    save(rig_plots.traces(runs), folder / "traces.png")
     clean = faults == Faults(noise=args.noise, seed=args.seed) and not any(args.cambers)
     shown = tire if clean and not args.turned else None
     free = [run for run in runs if run.point.kappa is None]
     if free:
-        rig_plots.save(rig_plots.lateral(free, shown), folder / "lateral.png")
+        save(rig_plots.lateral(free, shown), folder / "lateral.png")
     if len(free) < len(runs):
-        rig_plots.save(rig_plots.longitudinal(runs), folder / "longitudinal.png")
-    if second is not None:
-        others = measure(second, points, faults, travel=args.travel, progress=_bar)
+        save(rig_plots.longitudinal(runs), folder / "longitudinal.png")
+    if second and others:
         figure = rig_plots.compared(runs, others, (tire.name, second.name))
-        rig_plots.save(figure, folder / "compared.png")
+        save(figure, folder / "compared.png")
+    if tire.unused:
+        print(f"not used of the tire's file: {', '.join(tire.unused)}")
     print(_summary(runs, tire, folder, faults.noise > 0.0 or any(offset)))
     return 0
 

@@ -83,7 +83,12 @@ def run(args: argparse.Namespace) -> int:
 
     check_vacant(args.out, args.force)
     spec = load_spec(
-        args.model, args.scene, options.tires(args.tire), grade=args.grade, tilt=args.tilt
+        args.model,
+        args.scene,
+        options.tires(args.tire),
+        grade=args.grade,
+        tilt=args.tilt,
+        timestep=args.timestep,
     )
     inputs, measured = _drive(args, spec.compile())
     duration = args.duration
@@ -94,7 +99,6 @@ def run(args: argparse.Namespace) -> int:
         inputs,
         duration,
         initial=Initial(args.position, args.heading, args.speed, args.yaw_rate),
-        timestep=args.timestep,
         sample_rate=args.sample_rate,
         brakes=args.brakes,
         progress=True,

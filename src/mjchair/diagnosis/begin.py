@@ -10,6 +10,7 @@ from mjchair.simulation.initial import Initial
 
 Array = NDArray[np.float64]
 RADIUS, TRACK = 0.3, 0.56  # m, of the rear wheels; a first guess only
+STANDS = (0.03, 0.05)  # m/s and rad/s, below which a chair stands
 SPAN = 0.3  # s, of the line through the first samples
 
 
@@ -57,6 +58,8 @@ def initial(run: Run) -> Initial:
     position = start.position if x is None or y is None else (x, y)
     speed = start.speed if "speed" in run.given else _speed(run)
     yaw = start.yaw_rate if "yaw_rate" in run.given else _yaw_rate(run)
+    if "speed" not in run.given and abs(speed) < STANDS[0] and abs(yaw) < STANDS[1]:
+        speed = yaw = 0.0
     return Initial(position=position, heading=heading or 0.0, speed=speed, yaw_rate=yaw)
 
 

@@ -16,7 +16,9 @@ Array = NDArray[np.float64]
 # deflections, wheel spin) settles on it within the lead of a window.
 SLOW = ("x", "y", "heading", "speed", "yaw_rate", "left_caster", "right_caster")
 STEPS = np.array([0.05, 0.05, 0.01, 0.02, 0.02, 0.03, 0.03])  # of finite differences
-BROAD = np.array([10.0, 10.0, 3.0, 3.0, 3.0, 0.5, 0.5])  # prior where data see it
+BROAD = np.array([1.0, 1.0, 0.3, 0.3, 0.3, 0.3, 0.3])  # prior where data see it
+# a standing chair rocks on its tires when it is given a speed: there speed is not a slow state
+STANDING = 0.002  # m/s and rad/s
 LINKED = np.array([1.0, 1.0, 0.01, 0.05, 0.05, 0.1, 0.1])  # and where only the last window does
 
 
@@ -59,6 +61,11 @@ class Chair:
         chair = model.body(model.jnt_bodyid[names.find("chair", names.joints(model), "joint")]).id
         local = data.xmat[chair].reshape(3, 3).T @ (data.geom_xpos[geom] - data.xpos[chair])
         return int(model.jnt_dofadr[joint]), float(model.geom_size[geom, 0]), float(local[1])
+
+    def stands(self, state: State) -> bool:
+        """Whether the chair stands on its tires, within what a window can tell."""
+        still = np.hypot(*state.qvel[self.dof : self.dof + 2]) < 0.02
+        return bool(still and abs(state.qvel[self.dof + 5]) < 0.03)
 
     def moved(self, state: State, change: Array) -> State:
         """The state moved along the slow state.

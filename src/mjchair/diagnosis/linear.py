@@ -21,6 +21,7 @@ from mjchair.diagnosis.tracking import Track, prior
 Array = NDArray[np.float64]
 BAND = 2.0  # Hz, below which a residual is looked at in cells
 RIDGE = 1e-9
+SEEN = 1e-4  # share of a column that must survive the elimination
 
 
 @dataclass
@@ -46,7 +47,8 @@ class System:
     Attributes:
       names: of the columns. nuisance: how many of them, at the start, are nuisances with unit
         prior. G: (windows, p, p). b: (windows, p). c: (windows,) chi2 of the residual.
-      cells: slow parts. run: (windows,) index of the run.
+      cells: slow parts. run: (windows,) index of the run. back: (nuisance,) where the model
+        already stands from the centre of its priors, in standard deviations.
     """
 
     names: list[str]
@@ -56,6 +58,7 @@ class System:
     c: Array
     cells: list[Cells]
     run: NDArray[np.int64]
+    back: Array
 
     def index(self, names: Sequence[str]) -> list[int]:
         """Places of columns."""
@@ -116,7 +119,7 @@ def slow_columns(shooter: Shooter, track: Track, window: int) -> tuple[Array, Ar
     free = np.zeros((rows, len(shooter.channels), len(angles)))
     for k, i in enumerate(angles):
         free[:, i, k] = 1.0
-    spread = np.r_[prior(shooter, window) / STEPS, np.full(len(angles), 1e4)]
+    spread = np.r_[prior(shooter, window, track.states[window]) / STEPS, np.full(len(angles), 1e4)]
     assert dynamic.shape[2] == len(SLOW)
     return np.concatenate([dynamic, free], axis=2), 1.0 / spread**2
 
@@ -128,6 +131,7 @@ def build(
     columns: dict[str, list[Array]],
     nuisance: int,
     whitener: Whitener | None = None,
+    offsets: dict[str, float] | None = None,
 ) -> System:
     """Eliminate every window's slow state and form the products.
 
@@ -140,6 +144,7 @@ def build(
     count = len(shooter.windows)
     G, b, c = np.zeros((count, p, p)), np.zeros((count, p)), np.zeros(count)
     cells = []
+    raw = np.zeros(p)
     for i, w in enumerate(shooter.windows):
         miss = residual(shooter.measured(w), track.predicted[i], shooter.channels)
         r = white(i, np.nan_to_num(miss)[:, :, None])[:, 0]
@@ -150,10 +155,16 @@ def build(
         Zr, ZJ = Z.T @ r, Z.T @ J
         G[i] = J.T @ J - ZJ.T @ cho_solve(factor, ZJ)
         b[i] = J.T @ r - ZJ.T @ cho_solve(factor, Zr)
+        raw += (J * J).sum(axis=0)
         c[i] = r @ r - Zr @ cho_solve(factor, Zr)
         cells.append(_cells(white.sizes(i), w.last - w.first, r, Z, factor))
+    # what a free initial state takes away whole is nothing but rounding afterwards
+    hidden = G.sum(axis=0).diagonal() < SEEN * raw
+    hidden[:nuisance] = False
+    G[:, hidden, :], G[:, :, hidden], b[:, hidden] = 0.0, 0.0, 0.0
     run = np.array([w.run for w in shooter.windows])
-    return System(names, nuisance, G, b, c, cells, run)
+    back = np.array([(offsets or {}).get(n, 0.0) for n in names[:nuisance]])
+    return System(names, nuisance, G, b, c, cells, run, back)
 
 
 def basis(sizes: Sequence[int], span: float) -> list[Array]:
@@ -230,12 +241,22 @@ class Reduced:
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(unit))) / scale)
 
 
-def reduce(system: System, windows: Sequence[int] | NDArray[np.int64]) -> Reduced:
-    """Sum over the windows and eliminate the nuisances (unit prior)."""
+def reduce(
+    system: System, windows: Sequence[int] | NDArray[np.int64], free: int = 0
+) -> Reduced:
+    """Sum over the windows and eliminate the nuisances (unit prior).
+
+    Args:
+      free: how many of the nuisances, the last ones, have no prior: effects already accepted.
+    """
     w = list(windows)
     n = system.nuisance
     G, b = system.G[w].sum(axis=0), system.b[w].sum(axis=0)
-    inner = cho_factor(G[:n, :n] + np.eye(n))
+    b[:n] -= system.back
+    precision = np.ones(n)
+    if free:
+        precision[n - free :] = 1e-8 * np.diag(G)[n - free : n]
+    inner = cho_factor(G[:n, :n] + np.diag(precision + 1e-12))
     cross = G[:n, n:]
     return Reduced(
         system.names[n:],
@@ -249,10 +270,12 @@ def fit(system: System, windows: Sequence[int] | NDArray[np.int64], which: Seque
     w, n = list(windows), system.nuisance
     use = [*range(n), *which]
     G = system.G[w].sum(axis=0)[np.ix_(use, use)]
-    scale = np.sqrt(np.maximum(np.diag(G), 1e-300))
-    precision = np.r_[np.ones(n), 1e-8 * scale[n:] ** 2]
+    size = np.maximum(np.diag(G), 1e-12)
+    precision = np.r_[np.ones(n), 1e-8 * size[n:]]
+    b = system.b[w].sum(axis=0)[use]
+    b[:n] -= system.back
     out = np.zeros(len(system.names))
-    out[use] = np.linalg.solve(G + np.diag(precision), system.b[w].sum(axis=0)[use])
+    out[use] = np.linalg.solve(G + np.diag(precision), b)
     return out
 
 

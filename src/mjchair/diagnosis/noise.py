@@ -162,3 +162,48 @@ def _still_rows(time: Array, channels: Mapping[str, Array]) -> list[NDArray[np.i
 
 def _there(values: Array) -> Array:
     return np.asarray(values[~np.isnan(values)])
+
+
+def refined(shooter, track, known: dict[str, Noise]) -> dict[str, Noise]:  # type: ignore[no-untyped-def]
+    """Noise from what a first pass leaves above the band of chair motion.
+
+    A channel that scatters otherwise than assumed gets the scatter that it has, and a correlated
+    part where neighbouring samples go together.
+    """
+    from mjchair.diagnosis.shooting import residual
+
+    pieces: dict[str, list[Array]] = {c: [] for c in shooter.channels}
+    for i, w in enumerate(shooter.windows):
+        miss = residual(shooter.measured(w), track.predicted[i], shooter.channels)
+        for k, channel in enumerate(shooter.channels):
+            r = miss[:, k][~np.isnan(miss[:, k])]
+            if r.size >= 30:
+                pieces[channel].append(_fast(r, w.last - w.first))
+    return {c: _refined(known[c], pieces[c], shooter, c) for c in shooter.channels}
+
+
+FAST = 5.0  # Hz, above which no effect of a chair is looked for
+
+
+def _fast(values: Array, span: float) -> Array:
+    n = values.size
+    k = min(n // 3, max(3, round(2.0 * span * FAST)))
+    phase = np.pi * (np.arange(n)[:, None] + 0.5) * np.arange(k)[None, :] / n
+    waves, _ = np.linalg.qr(np.cos(phase))
+    return np.asarray((values - waves @ (waves.T @ values)) / np.sqrt(1.0 - k / n))
+
+
+def _refined(known: Noise, pieces: list[Array], shooter, channel: str) -> Noise:  # type: ignore[no-untyped-def]
+    if not pieces:
+        return known
+    joined = np.concatenate(pieces)
+    size = float(np.sqrt(np.mean(np.clip(joined, *np.percentile(joined, [0.5, 99.5])) ** 2))) * 1.03
+    ratio = size / known.total
+    if 0.87 < ratio < 1.15 or size < floor(channel):
+        return known
+    if known.source == "study.toml" and ratio < 1.0:
+        return known  # rounding and correlation hide noise from this look: believe the study
+    scale = max(ratio, floor(channel) / known.total)
+    return Noise(
+        known.white * scale, known.slow * scale, known.time, "what a first pass leaves above 5 Hz"
+    )

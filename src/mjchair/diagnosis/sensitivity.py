@@ -31,6 +31,7 @@ class Point:
 
     edit: Callable[[mujoco.MjSpec], None]
     factor: float = 1.0
+    fine: bool = False
 
 
 def differences(
@@ -49,6 +50,11 @@ def differences(
     seen = observer or Observer(shooter.channels)
     columns = []
     with installed():
+        if any(not point.fine for point in points):
+            if track.coarse is None or seen != track.seen:
+                base = shooter.compile(base_edit, coarse=True)
+                track.coarse, track.seen = predictions(shooter, track, base, seen), seen
+            coarse = track.coarse
         for point in points:
 
             def edit(spec: mujoco.MjSpec, point: Point = point) -> None:
@@ -56,25 +62,36 @@ def differences(
                     base_edit(spec)
                 point.edit(spec)
 
-            model = shooter.compile(edit)
-            jobs = [Job(model, w, s) for w, s in zip(shooter.windows, track.states, strict=True)]
-            columns.append(
-                [
-                    point.factor * (seen.observe(shooter, w, o.predicted) - y)
-                    for w, o, y in zip(
-                        shooter.windows, shooter.run(jobs), track.predicted, strict=True
-                    )
-                ]
-            )
-            columns[-1] = _unwrapped(shooter, columns[-1])
+            model = shooter.compile(edit, coarse=not point.fine)
+            reference = track.predicted if point.fine else coarse
+            edited = predictions(shooter, track, model, seen)
+            change = [point.factor * (e - y) for e, y in zip(edited, reference, strict=True)]
+            columns.append(_unwrapped(shooter, change))
             if progress is not None:
-                progress(len(jobs))
+                progress(len(change))
     return columns
+
+
+def predictions(
+    shooter: Shooter,
+    track: Track,
+    model: mujoco.MjModel,
+    observer: Observer,
+    late: float = 0.0,
+) -> Column:
+    """What a model predicts from the states of a track, with its inputs `late` (s)."""
+    jobs = [Job(model, w, s, late=late) for w, s in zip(shooter.windows, track.states, strict=True)]
+    return [
+        observer.observe(shooter, w, o.predicted)
+        for w, o in zip(shooter.windows, shooter.run(jobs), strict=True)
+    ]
 
 
 def _unwrapped(shooter: Shooter, column: Column) -> Column:
     nothing = [np.zeros_like(c) for c in column]
-    return [residual(c, n, shooter.channels) for c, n in zip(column, nothing, strict=True)]
+    return [
+        residual(c, n, shooter.channels) for c, n in zip(column, nothing, strict=True)
+    ]
 
 
 def half_step(spec: mujoco.MjSpec) -> None:
@@ -87,7 +104,9 @@ def other_integrator(spec: mujoco.MjSpec) -> None:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
 
 
-def sensor_column(shooter: Shooter, track: Track, kind: str, channel: str, size: float) -> Column:
+def sensor_column(
+    shooter: Shooter, track: Track, kind: str, channel: str, size: float
+) -> Column:
     """What a bias (SI), a scale (1) or a delay (s) of one channel changes."""
     which = list(shooter.channels).index(channel)
     out = []
@@ -152,8 +171,8 @@ def pulses(shooter: Shooter) -> list[Pulse]:
 def pulse_columns(
     shooter: Shooter,
     track: Track,
-    model: mujoco.MjModel,
     found: Sequence[Pulse],
+    base_edit: Callable[[mujoco.MjSpec], None] | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> list[Array]:
     """What each pulse of one newton or newton metre changes in its own window, (rows, channels).
@@ -161,9 +180,11 @@ def pulse_columns(
     Fx and Fy act along the chair's axes at the ground below the axle, Mz about its vertical, the
     wheels' torques about their axles.
     """
-    chair = Chair(shooter.base)
+    chair = shooter.chair
     out = []
+    model = shooter.compile(base_edit, coarse=True)
     with installed():
+        reference = predictions(shooter, track, model, Observer(shooter.channels))
         for at in range(0, len(found), 64):
             group = found[at : at + 64]
             jobs = [
@@ -171,29 +192,33 @@ def pulse_columns(
                     model,
                     shooter.windows[p.window],
                     track.states[p.window],
-                    _force(shooter, chair, track, p),
+                    _force(shooter, chair, track, p, float(model.opt.timestep)),
                 )
                 for p in group
             ]
             for p, o in zip(group, shooter.run(jobs), strict=True):
-                change = (o.predicted - track.predicted[p.window]) / PULSES[p.force]
+                change = (o.predicted - reference[p.window]) / PULSES[p.force]
                 out.append(change)
             if progress is not None:
                 progress(len(group))
     return out
 
 
-def _force(shooter: Shooter, chair: Chair, track: Track, pulse: Pulse) -> Array:
+def _force(
+    shooter: Shooter, chair: Chair, track: Track, pulse: Pulse, step: float
+) -> Array:
     w = shooter.windows[pulse.window]
-    time = w.start + shooter.step * np.arange(shooter.steps)
+    steps = int(np.ceil(shooter.steps * shooter.step / step)) + 1
+    every = max(1, round(step / shooter.step))
+    time = w.start + step * np.arange(steps)
     shape = np.clip(1.0 - np.abs(time - pulse.time) / pulse.width, 0.0, None)
     if pulse.time - pulse.width < w.first:  # the first pulse acts from the start of the lead
         shape[time < pulse.time] = 1.0
-    force = np.zeros((shooter.steps, shooter.base.nv))
+    force = np.zeros((steps, shooter.base.nv))
     size = PULSES[pulse.force] * shape
     if pulse.force in ("Fx", "Fy"):
         x, y = headings(chair, track.trace[pulse.window]["qpos"])
-        x, y = _fit(x, shooter.steps), _fit(y, shooter.steps)
+        x, y = _fit(x[::every], steps), _fit(y[::every], steps)
         east, north = (x, y) if pulse.force == "Fx" else (-y, x)
         force[:, chair.dof] = size * east
         force[:, chair.dof + 1] = size * north
@@ -205,9 +230,7 @@ def _force(shooter: Shooter, chair: Chair, track: Track, pulse: Pulse) -> Array:
 
 
 def _fit(values: Array, steps: int) -> Array:
-    return (
-        values[:steps] if len(values) >= steps else np.pad(values, (0, steps - len(values)), "edge")
-    )
+    return values[:steps] if len(values) >= steps else np.pad(values, (0, steps - len(values)), "edge")
 
 
 def headings(chair: Chair, qpos: Array) -> tuple[Array, Array]:
@@ -216,3 +239,5 @@ def headings(chair: Chair, qpos: Array) -> tuple[Array, Array]:
     east, north = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)
     size = np.hypot(east, north)
     return east / size, north / size
+
+

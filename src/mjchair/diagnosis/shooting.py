@@ -12,12 +12,13 @@ from mujoco import batch
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
-from mjchair.diagnosis.chair import State
+from mjchair.diagnosis.chair import Chair, State
 from mjchair.diagnosis.study import Run, Study
-from mjchair.diagnosis.windows import LEAD, Window, cut
+from mjchair.diagnosis.windows import Window, cut
 from mjchair.effects import rider_sway
+from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
-from mjchair.model.wheels import base_name
+from mjchair.model.wheels import base_name, check_timestep
 from mjchair.simulation import names
 from mjchair.simulation.channels import channels
 
@@ -36,13 +37,14 @@ class Job:
 
     Attributes:
       model: what is simulated. window: which. state: at the window's start, of the base model.
-      force: (steps, nv) generalized force on top, or None.
+      force: (steps, nv) generalized force on top, or None. late: s, by which inputs come later.
     """
 
     model: mujoco.MjModel
     window: Window
     state: State
     force: Array | None = None
+    late: float = 0.0
 
 
 @dataclass
@@ -76,23 +78,48 @@ class Shooter:
         self.channels = study.channels
         self.spec = stripped(study.spec)
         self.base = self.spec.copy().compile()
+        self.chair = Chair(self.base)
         self.step = float(self.base.opt.timestep)
         self.windows = list(windows) if windows is not None else cut(study.runs, self.step)
         longest = max(w.last - w.start for w in self.windows)
-        self.steps = int(np.ceil((longest + LEAD) / self.step)) + 3
+        self.steps = int(np.ceil(longest / self.step)) + 3
+        self.coarse = self._coarse_step()
         self._places: dict[int, list[int]] = {}
         self.motions = [_motion(run) for run in study.runs]
 
-    def compile(self, edit: Callable[[mujoco.MjSpec], None] | None = None) -> mujoco.MjModel:
-        """The base model, edited."""
+    def _coarse_step(self) -> float:
+        """Twice the step where the tires allow it: enough for differences of two simulations."""
+        model = copy.copy(self.base)
+        model.opt.timestep = 2.0 * self.step
+        try:
+            check_timestep(model)
+        except MjchairError:
+            return self.step
+        return 2.0 * self.step
+
+    def compile(
+        self, edit: Callable[[mujoco.MjSpec], None] | None = None, coarse: bool = False
+    ) -> mujoco.MjModel:
+        """The base model, edited; `coarse` for differences."""
         spec = self.spec.copy()
         if edit is not None:
             edit(spec)
+        if coarse:
+            spec.option.timestep *= self.coarse / self.step
         try:
             return spec.compile()
         except ValueError as error:
             line = " ".join(str(error).split())
             raise MjchairError(f"an effect does not compile: {line}") from None
+
+    def input_step(self) -> float:
+        """Median time between samples of the inputs, s; 0 where nothing is driven."""
+        steps = [
+            float(np.median(np.diff(r.trial.inputs.time)))
+            for r in self.study.runs
+            if r.trial.inputs is not None and r.trial.inputs.time.size > 1
+        ]
+        return max(steps, default=0.0)
 
     def measured(self, window: Window) -> Array:
         """Samples (rows, channels) of a window, NaN where missing."""
@@ -105,9 +132,11 @@ class Shooter:
             ]
         )
 
-    def controls(self, model: mujoco.MjModel, window: Window, steps: int) -> Array:
+    def controls(
+        self, model: mujoco.MjModel, window: Window, steps: int, late: float = 0.0
+    ) -> Array:
         """Controls (steps, nu) of a window: measured torques, and the rider's motion."""
-        time = window.start + float(model.opt.timestep) * np.arange(steps)
+        time = window.start + float(model.opt.timestep) * np.arange(steps) - late
         out = np.zeros((steps, model.nu))
         inputs = self.study.runs[window.run].trial.inputs
         known = names.actuators(model)
@@ -129,14 +158,14 @@ class Shooter:
             groups.setdefault((*key, job.force is None), []).append(i)
         for members in groups.values():
             model = jobs[members[0]].model
-            steps = int(round(self.steps * self.step / model.opt.timestep))
+            steps = int(np.ceil(self.steps * self.step / model.opt.timestep)) + 1
             width = model.nsensordata + (model.nq + model.nv + model.na if trace else 0)
             size = max(2, int(BYTES / (8 * steps * width)))
             for at in range(0, len(members), size):
                 chunk = members[at : at + size]
-                for i, outcome in zip(
-                    chunk, self._chunk([jobs[i] for i in chunk], steps, trace), strict=True
-                ):
+                with installed():
+                    done = self._chunk([jobs[i] for i in chunk], steps, trace)
+                for i, outcome in zip(chunk, done, strict=True):
                     outcomes[i] = outcome
         return [o for o in outcomes if o is not None]
 
@@ -146,12 +175,12 @@ class Shooter:
         many = batch.Batch(model, len(jobs), THREADS)
         many.set_models(models)
         self._set_states(many, jobs, model)
-        kept: dict[tuple[int, int], Array] = {}
+        kept: dict[tuple[int, int, float], Array] = {}
         rows = []
         for job, m in zip(jobs, models, strict=True):
-            key = (id(job.window), m.nu)
+            key = (id(job.window), m.nu, job.late)
             if key not in kept:
-                kept[key] = self.controls(m, job.window, steps)
+                kept[key] = self.controls(m, job.window, steps, job.late)
             rows.append(kept[key])
         control, what = np.stack(rows), int(CONTROL)
         if jobs[0].force is not None:

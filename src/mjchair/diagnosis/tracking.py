@@ -5,6 +5,7 @@ The fast part of the state is handed from window to window by the simulation its
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import mujoco
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.diagnosis import begin
-from mjchair.diagnosis.chair import BROAD, LINKED, SLOW, STEPS, Chair, State
+from mjchair.diagnosis.chair import BROAD, LINKED, SLOW, STANDING, STEPS, Chair, State
 from mjchair.diagnosis.noise import Noise
 from mjchair.diagnosis.observe import Observer
 from mjchair.diagnosis.shooting import Job, Shooter, residual
@@ -31,13 +32,16 @@ class Track:
     Attributes:
       states: at the start of each window, as of the base model. predicted: (rows, channels) each.
       slow: d predicted / d slow state, (rows, channels, 7) each, times chair.STEPS.
-      trace: forward, yaw rate and the like along each window, see `drivers`.
+      trace: qpos, qvel and act along each window, after each step. coarse: predictions at the
+        coarse step, once they were needed; seen: by what sensors.
     """
 
     states: list[State]
     predicted: list[Array]
     slow: list[Array]
     trace: list[dict[str, Array]]
+    coarse: list[Array] | None = None
+    seen: Observer | None = None
 
 
 def first_states(shooter: Shooter, model: mujoco.MjModel) -> dict[int, State]:
@@ -56,8 +60,15 @@ def first_states(shooter: Shooter, model: mujoco.MjModel) -> dict[int, State]:
     return out
 
 
-def prior(shooter: Shooter, window: int) -> Array:
-    """Standard deviation of the slow state of a window, (7,)."""
+def prior(shooter: Shooter, window: int, state: State) -> Array:
+    """Standard deviation of the slow state of a window that starts at `state`, (7,)."""
+    spread = _moving_prior(shooter, window)
+    if shooter.chair.stands(state):
+        spread[3:5] = STANDING
+    return spread
+
+
+def _moving_prior(shooter: Shooter, window: int) -> Array:
     w = shooter.windows[window]
     seen = begin.observed(shooter.study.runs[w.run])
     if w.index == 0:
@@ -66,7 +77,7 @@ def prior(shooter: Shooter, window: int) -> Array:
         if "speed" in given and not seen[3]:
             loose[3] = 0.1
         return loose
-    return np.where(seen, BROAD, LINKED)
+    return np.where(seen, BROAD, LINKED).copy()
 
 
 def track(
@@ -82,7 +93,9 @@ def track(
       model: of any size; states are those of the base model. before: a track to start from, of a
         model that is not far; one round is enough then.
     """
-    chair = Chair(shooter.base)
+    chair = shooter.chair
+    coarse = copy.copy(model)
+    coarse.opt.timestep *= shooter.coarse / shooter.step
     white = np.array([noise[c].total for c in shooter.channels])
     observer = observer or Observer(shooter.channels)
     count = len(shooter.windows)
@@ -90,7 +103,7 @@ def track(
     for i, w in enumerate(shooter.windows):
         by_index.setdefault(w.index, []).append(i)
     states: list[State | None] = [None] * count
-    firsts = first_states(shooter, shooter.base)
+    firsts = first_states(shooter, shooter.base) if before is None else {}
     predicted: list[Array] = [np.empty(0)] * count
     slow: list[Array] = [np.empty(0)] * count
     traces: list[dict[str, Array]] = [{}] * count
@@ -99,15 +112,23 @@ def track(
             members = by_index[index]
             for i in members:
                 w = shooter.windows[i]
-                if index == 0:
-                    states[i] = firsts[w.run].copy() if before is None else before.states[i].copy()
+                if before is not None:
+                    states[i] = before.states[i].copy()
                 elif states[i] is None:
                     states[i] = firsts[w.run].copy()
-                elif before is not None:
-                    states[i] = _slow_of(chair, before.states[i], states[i])
             rounds = ROUNDS if before is None else 1
             for _ in range(rounds):
-                _fit_round(shooter, chair, model, observer, members, states, white, predicted, slow)
+                _fit_round(
+                    shooter,
+                    chair,
+                    (model, coarse),
+                    observer,
+                    members,
+                    states,
+                    white,
+                    predicted,
+                    slow,
+                )
             jobs = [Job(model, shooter.windows[i], _some(states[i])) for i in members]
             for i, outcome in zip(members, shooter.run(jobs, trace=True), strict=True):
                 predicted[i] = observer.observe(shooter, shooter.windows[i], outcome.predicted)
@@ -121,15 +142,10 @@ def _some(state: State | None) -> State:
     return state
 
 
-def _slow_of(chair: Chair, known: State, running: State | None) -> State:
-    """A known state of a nearby model, for a window whose fast part has changed little."""
-    return known.copy()
-
-
 def _fit_round(
     shooter: Shooter,
     chair: Chair,
-    model: mujoco.MjModel,
+    models: tuple[mujoco.MjModel, mujoco.MjModel],
     observer: Observer,
     members: list[int],
     states: list[State | None],
@@ -140,26 +156,24 @@ def _fit_round(
     jobs = []
     for i in members:
         state, w = _some(states[i]), shooter.windows[i]
-        jobs.append(Job(model, w, state))
+        jobs += [Job(models[0], w, state), Job(models[1], w, state)]
         jobs += [
-            Job(model, w, chair.moved(state, STEPS[k] * np.eye(len(SLOW))[k]))
+            Job(models[1], w, chair.moved(state, STEPS[k] * np.eye(len(SLOW))[k]))
             for k in range(len(SLOW))
         ]
     outcomes = shooter.run(jobs)
-    each = 1 + len(SLOW)
+    each = 2 + len(SLOW)
     for n, i in enumerate(members):
         w = shooter.windows[i]
-        seen = [
-            observer.observe(shooter, w, o.predicted) for o in outcomes[n * each : n * each + each]
-        ]
+        seen = [observer.observe(shooter, w, o.predicted) for o in outcomes[n * each : n * each + each]]
         predicted[i] = seen[0]
-        slow[i] = np.stack([s - seen[0] for s in seen[1:]], axis=2)
+        slow[i] = np.stack([s - seen[1] for s in seen[2:]], axis=2)
         miss = residual(shooter.measured(w), seen[0], shooter.channels)
         there = ~np.isnan(miss)
         columns = np.concatenate([slow[i], _free_columns(shooter)[None].repeat(len(miss), 0)], 2)
         a = (columns / white[None, :, None])[there]
         b = (miss / white)[there]
-        spread = np.r_[prior(shooter, i) / STEPS, np.full(columns.shape[2] - len(SLOW), 1e4)]
+        spread = np.r_[prior(shooter, i, _some(states[i])) / STEPS, np.full(columns.shape[2] - len(SLOW), 1e4)]
         normal = a.T @ a + np.diag(1.0 / spread**2)
         change = np.linalg.solve(normal, a.T @ b)[: len(SLOW)]
         change = np.clip(change, -20.0, 20.0)

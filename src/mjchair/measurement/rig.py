@@ -1,10 +1,12 @@
 """Tables of rig measurements: one row a steady run, CSV, read and validated.
 
 Columns: ``slip_angle_deg``, ``load_n`` and either ``fy_n`` or the two lateral cells ``cell_1_n``
-and ``cell_2_n``, whose mean is taken, as in Silva & Dedini (2007). Optional: ``camber_deg``, ``kappa``,
-``fx_n``, ``speed_mps``, ``turned`` (1: the wheel is turned round on its axle) and ``fy_sigma_n``,
-the standard deviation of a row's force. Others are left alone. Signs are ISO-W: a positive slip
-angle gives a negative force; `paper_sign` reads tables with the paper's sign, the other one.
+and ``cell_2_n``, whose mean is taken, as in Silva & Dedini (2007). Optional: ``camber_deg``,
+``kappa``, ``fx_n``, ``speed_mps``, ``turned`` (1: the wheel is turned round on its axle) and
+``fy_sigma_n``, the standard deviation of a row's force. Others are left alone.
+
+Signs are ISO-W: a positive slip angle gives a negative force. `paper_sign` reads tables with the
+paper's sign, the other one.
 """
 
 from __future__ import annotations

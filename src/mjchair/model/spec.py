@@ -21,7 +21,7 @@ from mjchair.errors import MjchairError, nearest
 from mjchair.model import assets
 from mjchair.model.ground import FLOOR, set_heights, set_step
 from mjchair.model.parameters import ChairParameters
-from mjchair.model.wheels import SUFFIX, WHEELS, base_name, check, cut_damping, plain_name, wheels
+from mjchair.model.wheels import SUFFIX, WHEELS, base_name, check, cut_damping, wheels
 from mjchair.tire import Tire, block
 
 TireChoice = str | os.PathLike[str] | Tire
@@ -36,6 +36,7 @@ def load_spec(
     *,
     grade: float | None = None,
     tilt: str = "floor",
+    timestep: float | None = None,
     heights: ArrayLike | None = None,
     step: float | None = None,
     parameters: ChairParameters | None = None,
@@ -56,6 +57,7 @@ def load_spec(
       grade: rise over run of the ramp (along +x) or of the cross slope (along +y), 1.
       tilt: "floor" turns floor and chair in the world; "gravity" leaves them level and turns
         gravity.
+      timestep: s; None: the chair's.
       heights: (nrow, ncol), m, of the scene `hfield`; see mjchair.model.ground.set_heights.
       step: height of the scene `kerb` or `threshold`, m.
       parameters: a designer's changes to the chair; see ChairParameters.
@@ -81,6 +83,10 @@ def load_spec(
         )
     if heights is not None:
         set_heights(spec, heights)
+    if timestep is not None:
+        if not (math.isfinite(timestep) and timestep > 0.0):
+            raise MjchairError(f"timestep is {timestep:g} s; it must be positive, such as 0.002")
+        spec.option.timestep = timestep
     set_tires(spec, tire)
     return finished(spec, parameters)
 
@@ -245,10 +251,10 @@ def set_tires(
         if key not in known:
             raise MjchairError(f"no wheel {key!r} to put a tire on" + nearest(key, known))
     for geom in spec.geoms:
-        wheel = plain_name(base_name(geom.name).removesuffix(SUFFIX), WHEELS)
-        if not geom.name.endswith(SUFFIX) or not wheel:
+        if not geom.name.endswith(SUFFIX):
             continue
-        group = "casters" if wheel in GROUPS["casters"] else "wheels"
+        wheel = base_name(geom.name).removesuffix(SUFFIX)
+        group = "casters" if "caster" in wheel else "wheels"
         choice = groups.get(wheel, groups.get(group))
         if tire is not None and not isinstance(tire, Mapping):
             choice = tire

@@ -16,15 +16,26 @@ WHEELS = ("left_wheel", "right_wheel", "left_caster", "right_caster")
 SUFFIX = "_tire"
 
 
+# what every chair has, by name; the README says what each is
+NAMES = (
+    *WHEELS,
+    *(wheel + SUFFIX for wheel in WHEELS),
+    *("left_caster_swivel", "right_caster_swivel", "left_caster_angle", "right_caster_angle"),
+    *("left_wheel_angle", "right_wheel_angle", "left_wheel_speed", "right_wheel_speed"),
+    *("left_brake", "right_brake", "chair", "imu", "axle", "imu_gyro", "imu_accelerometer"),
+    *("position", "heading", "velocity"),
+)
+
+
 def base_name(name: str) -> str:
-    """A name without the prefixes that attachments gave it."""
-    return name.rsplit("/", 1)[-1]
+    """A name without the prefixes that attachments gave it.
 
-
-def plain_name(name: str, known: tuple[str, ...]) -> str:
-    """The one of the `known` names that `name` ends in, behind any prefix, or an empty string."""
-    ends = [k for k in known if name == k or name.endswith(k)]
-    return max(ends, key=len) if ends else ""
+    That is what follows the last "/", or, behind any other prefix that does not end in a letter
+    or a digit, the longest of NAMES that it ends in.
+    """
+    tail = name.rsplit("/", 1)[-1]
+    behind = [n for n in NAMES if tail.endswith(n) and not tail[: -len(n)][-1:].isalnum()]
+    return max(behind, key=len, default=tail)
 
 
 @dataclass(frozen=True)
@@ -81,7 +92,7 @@ def check(model: mujoco.MjModel) -> None:
     have = {wheel.joint for wheel in found}
     for joint in range(model.njnt):
         name = model.joint(joint).name
-        if plain_name(base_name(name), WHEELS) and joint not in have:
+        if base_name(name) in WHEELS and joint not in have:
             raise MjchairError(
                 f"wheel {name!r} has no tire: its body needs a geom named {name + SUFFIX!r} with "
                 "a tire block, and a user actuator of that name with actdim 4"

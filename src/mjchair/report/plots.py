@@ -19,6 +19,7 @@ from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
 from mjchair.errors import MjchairError
 from mjchair.report.forces import COLOURS, Array, peak, round_up, wheel_forces
+from mjchair.simulation.names import same
 from mjchair.simulation.recording import Recording
 from mjchair.storage import whole
 
@@ -72,7 +73,7 @@ def wheel_speed(
             label=f"simulated, {name}",
         )
         for actuator, torque in recording.controls.items():
-            if actuator.rsplit("/", 1)[-1] == wheel:
+            if same(actuator, wheel):
                 bottom.plot(recording.time, torque, style, color=colour, lw=1.2, label=name)
     top.set_ylabel("wheel speed (rad/s)")
     bottom.set_ylabel("axle torque (N m)")

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-
-import matplotlib
-
-matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -16,7 +11,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mjchair.simulation.rig import Run
-from mjchair.storage import whole
 from mjchair.tire import Tire, law
 
 Array = NDArray[np.float64]
@@ -25,13 +19,6 @@ LOADS = ("#1b6ca8", "#c8553d", "#3b7d4f", "#7a4fa3", "#a8843b", "#4a4a4a")
 SPEEDS = ("o", "^", "s", "D", "v", "P")
 CELLS = ("#1b6ca8", "#c8553d", "#8a8a8a")
 SIGN = "lateral force, -Fy (N)"  # the paper's sign: positive for a positive angle
-
-
-def save(figure: Figure, path: str | os.PathLike[str], dpi: int = 130) -> None:
-    """Write a figure, whole, and close it."""
-    with whole(path) as temporary:
-        figure.savefig(temporary, dpi=dpi)
-    plt.close(figure)
 
 
 def traces(runs: Sequence[Run]) -> Figure:
@@ -69,8 +56,8 @@ def traces(runs: Sequence[Run]) -> Figure:
 
 def _trace(axis: Axes, run: Run) -> None:
     for i, name in enumerate(("cell 1, lateral", "cell 2, lateral", "cell 3, longitudinal")):
-        style = {"linestyle": "--"} if i == 1 else {}
-        axis.plot(run.time, run.cells[:, i], color=CELLS[i], lw=1.2, label=name, **style)
+        style = "--" if i == 1 else "-"
+        axis.plot(run.time, run.cells[:, i], style, color=CELLS[i], lw=1.2, label=name)
     axis.axhline(0.0, color="0.8", lw=0.8, zorder=0)
 
 

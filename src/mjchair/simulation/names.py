@@ -36,8 +36,9 @@ def geoms(model: mujoco.MjModel) -> list[str]:
 
 
 def same(full: str, name: str) -> bool:
-    """Whether `full` is `name`, with or without a prefix that ends in "/"."""
-    return name in (full, base_name(full))
+    """Whether `full` is `name`, with or without a prefix; a component (".x") goes along."""
+    object_name, dot, component = full.partition(".")
+    return name in (full, base_name(object_name) + dot + component)
 
 
 def find(name: str, known: Sequence[str], what: str) -> int:

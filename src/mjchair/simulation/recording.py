@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from mjchair.errors import MjchairError, nearest
+from mjchair.simulation.names import same
 from mjchair.simulation.stored_model import StoredModel
 from mjchair.simulation.table import Array, frozen
 from mjchair.storage import whole
@@ -86,7 +87,7 @@ class Recording:
         """
         if name in self.channels:
             return self.channels[name]
-        behind = [full for full in self.channels if full.endswith("/" + name)]
+        behind = [full for full in self.channels if same(full, name)]
         if len(behind) == 1:
             return self.channels[behind[0]]
         raise MjchairError(f"no channel {name!r}" + nearest(name, behind or self.channels))

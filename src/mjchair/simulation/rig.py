@@ -84,8 +84,8 @@ class Faults:
 
     Attributes:
       toe: added to the slip angle, deg. camber: added to the camber, deg.
-      offset: of each cell's reading, N. noise: of a reading, standard deviation over the largest
-        force of the sweep. seed: of the noise.
+      offset: of each cell's reading, N. noise: of each cell's reading, standard deviation over the
+        largest lateral force of the sweep. seed: of the noise.
     """
 
     toe: float = 0.0
@@ -93,6 +93,18 @@ class Faults:
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     noise: float = 0.0
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        for name, value, low, high, unit in (
+            ("toe", self.toe, -30.0, 30.0, "deg"),
+            ("hidden camber", self.camber, -45.0, 45.0, "deg"),
+            ("noise", self.noise, 0.0, 10.0, "of the largest force"),
+        ):
+            if not low <= value <= high:
+                raise MjchairError(
+                    f"{name} is {value:g} {unit}; it must be within {low:g} to {high:g}"
+                )
 
 
 @dataclass(frozen=True)
@@ -178,10 +190,22 @@ def specification(tire: Tire, point: Point, faults: Faults | None = None) -> muj
     spec.body("guide").pos = (0.0, 0.0, radius)
     yaw, roll = -math.radians(point.angle + faults.toe), math.radians(point.camber + faults.camber)
     spec.body("fork").quat = _turned(yaw, roll)
+    _strengthen(spec, max(1.0, point.load / max(LOADS)))
     if point.kappa is not None:
         spec.joint("wheel").armature = HELD
     spec.option.timestep = _timestep(spec)
     return spec
+
+
+def _strengthen(spec: mujoco.MjSpec, factor: float) -> None:
+    """Make cells, guide and wheel heavier for loads beyond the paper's, in proportion."""
+    for tendon in spec.tendons:
+        tendon.stiffness = np.asarray(tendon.stiffness) * factor
+        tendon.damping = np.asarray(tendon.damping) * factor
+    for name in ("guide", "wheel"):
+        body = spec.body(name)
+        body.mass *= factor
+        body.inertia = np.asarray(body.inertia) * factor
 
 
 def mirrored(tire: Tire) -> Tire:
@@ -311,20 +335,15 @@ def _read(run: Run) -> Run:
 
 
 def _with_noise(runs: list[Run], faults: Faults) -> list[Run]:
-    """The runs with noise on what the cells give for each run.
-
-    The noise is one error a run (repeatability), not white noise along the trace, which an
-    average would remove.
-    """
+    """The runs with noise: one error a cell and run, which averaging a trace does not remove, and
+    as much again along the trace, which it does."""
     if faults.noise == 0.0:
         return runs
     size = faults.noise * max(abs(run.force[1]) for run in runs)
     rng = np.random.default_rng(faults.seed)
     noisy = []
     for run in runs:
-        error = rng.normal(0.0, size, 3)
-        error[:2] = error[0]  # the mean of the lateral cells gets the whole of it
-        trace = rng.normal(0.0, size, run.cells.shape)
-        trace -= trace[-max(1, round(STEADY * SAMPLES)) :].mean(axis=0)
-        noisy.append(_read(replace(run, cells=run.cells + error + trace)))
+        along = rng.normal(0.0, size, run.cells.shape)
+        along -= along[-max(1, round(STEADY * SAMPLES)) :].mean(axis=0)
+        noisy.append(_read(replace(run, cells=run.cells + rng.normal(0.0, size, 3) + along)))
     return noisy

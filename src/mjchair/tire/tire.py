@@ -18,7 +18,8 @@ from mjchair.tire import block, law
 from mjchair.tire.compiled import fingerprint
 from mjchair.tire.families import COEFFICIENTS, packed
 
-FRICTION_RANGE = (0.01, 5.0)  # racing tires on test belts pass 3
+FRICTION_RANGE = (0.01, 3.0)
+BELT_FRICTION_RANGE = (0.01, 5.0)  # of .tir files: racing tires on test belts pass 3
 LOAD_UNITS = {"N": 1.0, "kN": 1000.0}
 
 
@@ -126,7 +127,7 @@ class Tire:
 
     def _check_friction(self) -> None:
         peak = self.peak_friction(self.nominal_load)
-        low, high = FRICTION_RANGE
+        low, high = BELT_FRICTION_RANGE if self.family.startswith("mf") else FRICTION_RANGE
         for axis, value in zip(("longitudinal", "lateral"), peak, strict=True):
             if not low <= value <= high:
                 hint = "; is it meant in kN, or in N?" if "load_unit" in self.coefficients else ""
@@ -168,17 +169,42 @@ class Tire:
           alpha: slip angle, rad; a positive one gives a negative Fy.
           gamma: camber, rad, about +x. speed: of the wheel along its heading, m/s.
         """
-        given = np.broadcast_arrays(fz, kappa, np.tan(np.asarray(alpha, float)), gamma, speed)
-        shape = given[0].shape
-        flat = [np.ascontiguousarray(array, dtype=np.float64).ravel() for array in given]
-        out = np.empty((flat[0].size, 5))
-        _forces_loop()(self.block(), *flat, out)
-        fx, fy, mx, my, mz = (out[:, i].reshape(shape) for i in range(5))
-        return Forces(fx, fy, mz, mx, my)
+        return block_forces(self.block(), fz, kappa, alpha, gamma, speed)
 
     def with_(self, **changes: float) -> Tire:
         """A copy with other numbers, checked like a new one."""
         return replace(self, **changes)  # type: ignore[arg-type]
+
+
+def block_of(
+    family: str, coefficients: Mapping[str, float], radius: float = 0.3
+) -> NDArray[np.float64]:
+    """A block with nothing but its family and coefficients: unchecked, for fits."""
+    header = np.zeros(block.HEADER)
+    header[block.TAG_AT] = block.TAG
+    header[block.VERSION_AT] = block.VERSION
+    header[block.FAMILY] = block.FAMILIES.index(family)
+    header[[block.FRICTION_FACTOR, block.STIFFNESS_FACTOR, block.NOMINAL_LOAD]] = 1.0
+    header[block.RADIUS] = radius
+    return np.concatenate([header, packed(family, coefficients, radius)])
+
+
+def block_forces(
+    packed_tire: NDArray[np.float64],
+    fz: ArrayLike,
+    kappa: ArrayLike,
+    alpha: ArrayLike,
+    gamma: ArrayLike = 0.0,
+    speed: ArrayLike = 1.0,
+) -> Forces:
+    """`Tire.forces` of the tire in a block."""
+    given = np.broadcast_arrays(fz, kappa, np.tan(np.asarray(alpha, float)), gamma, speed)
+    shape = given[0].shape
+    flat = [np.ascontiguousarray(array, dtype=np.float64).ravel() for array in given]
+    out = np.empty((flat[0].size, 5))
+    _forces_loop()(packed_tire, *flat, out)
+    fx, fy, mx, my, mz = (out[:, i].reshape(shape) for i in range(5))
+    return Forces(fx, fy, mz, mx, my)
 
 
 @functools.cache

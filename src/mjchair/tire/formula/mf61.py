@@ -30,7 +30,7 @@ from numba.extending import register_jitable
 from mjchair.tire.block import FAMILY, MF52, RADIUS
 from mjchair.tire.formula.mf_fold import AT
 
-SHORTEST = 0.1  # of the radius: a shorter relaxation length would be too stiff for a light wheel
+SHORTEST = 0.3  # of the radius: shorter relaxation would be too stiff for a light wheel at 2 ms
 LENGTH = 0.5  # of the radius, where the file has neither stiffness nor length; an assumption
 
 

@@ -1,0 +1,472 @@
+"""Studies with an effect hidden in them, made by means that the diagnosis does not know.
+
+Shares no effect code with the library: what is hidden here is an edit of the compiled MjModel, or
+a force that this file computes and applies in its own loop of mj_step, at half the step of the
+diagnosis and with another integrator. Masses, stiffnesses and sensors are off by a few percent,
+the samples are noisy, rounded, and now and then missing. The answer goes into a sealed file.
+"""
+
+from __future__ import annotations
+
+import base64
+import csv
+import json
+import zlib
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+import mjchair
+from mjchair.simulation.initial import Initial, start
+
+STEP = 0.001  # s
+RATE = 100  # Hz, of the tables
+SEAL = "answer.sealed"
+WHEELS = ("left_wheel", "right_wheel", "left_caster", "right_caster")
+NOISE = {  # standard deviations, SI, and rounding
+    "left_wheel_angle": (0.01, 2 * np.pi / 2048),
+    "right_wheel_angle": (0.01, 2 * np.pi / 2048),
+    "left_wheel_speed": (0.05, 0.0),
+    "right_wheel_speed": (0.05, 0.0),
+    "left_caster_angle": (0.01, 0.0),
+    "right_caster_angle": (0.01, 0.0),
+    "imu_gyro.z": (0.02, 0.0),
+    "imu_accelerometer.x": (0.3, 0.0),
+    "imu_accelerometer.y": (0.3, 0.0),
+    "position.x": (0.01, 0.0),
+    "position.y": (0.01, 0.0),
+    "heading": (0.01, 0.0),
+}
+
+
+@dataclass
+class Manoeuvre:
+    """One run: how it starts and what drives it."""
+
+    name: str
+    heading: float
+    speed: float
+    yaw: float = 0.0
+    torque: object = None  # t -> (left, right), N m; None: a coast
+    position: tuple[float, float] = (0.0, 0.0)
+
+
+def _pushes(t: float) -> tuple[float, float]:
+    phase = (t - 0.2) % 1.15
+    bell = 14.0 * np.sin(np.pi * phase / 0.46) ** 2 if 0.0 <= phase < 0.46 and t > 0.2 else 0.0
+    return bell, bell
+
+
+def _slalom(t: float) -> tuple[float, float]:
+    swing = 5.0 * np.sin(2 * np.pi * 0.4 * t)
+    return 1.8 + swing, 1.8 - swing
+
+
+def _stop_and_go(t: float) -> tuple[float, float]:
+    # ramps of 0.1 s: a table at RATE must be able to tell its torque
+    on = 0.5 * (1.0 + np.tanh((t - 1.0) / 0.05))
+    base = 2.5 + 5.5 * np.tanh(np.sin(2.0 * np.pi * (t - 1.0) / 3.0) / 0.2)
+    return on * (base + 2.5 * np.sin(1.7 * t)), on * (base - 2.5 * np.sin(1.7 * t))
+
+
+MANOEUVRES = (
+    Manoeuvre("coast", 0.0, 1.8),
+    Manoeuvre("coast", np.pi, 1.4, position=(6.0, 0.2)),
+    Manoeuvre("turn", 0.5, 1.3, 0.55),
+    Manoeuvre("push", 1.2, 0.8, 0.0, _pushes),
+    Manoeuvre("slalom", -0.6, 1.1, 0.0, _slalom),
+    Manoeuvre("start", 2.4, 0.0, 0.0, _stop_and_go),
+)
+
+
+@dataclass
+class Case:
+    """What is hidden: kind is none, one, two or outside; hidden maps names to parameters."""
+
+    kind: str
+    hidden: dict[str, dict[str, float]] = field(default_factory=dict)
+    sigma: float = 0.0
+    channel: str = ""
+
+
+class World:
+    """A chair with something hidden in it, stepped by this file."""
+
+    def __init__(self, rng: np.random.Generator, hidden: dict[str, dict[str, float]]) -> None:
+        """Perturb what is roughly known, then hide the effects."""
+        self.hidden = hidden
+        self.forces = [n for n in hidden if hasattr(self, f"_force_{n}")]
+        spec = mjchair.load_spec()
+        for geom in list(spec.geoms):
+            if not geom.contype and not geom.conaffinity:
+                spec.delete(geom)
+        m = spec.compile()
+        m.opt.timestep = STEP
+        m.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
+        self.m = m
+        self.chair = m.body("chair").id
+        self.dof = {j: int(m.joint(j).dofadr[0]) for j in (*WHEELS, *SWIVELS)}
+        self.tire = {w: m.geom(f"{w}_tire").id for w in WHEELS}
+        self._perturb(rng)
+        for name, values in hidden.items():
+            edit = getattr(self, f"_edit_{name}", None)
+            if edit is not None:
+                edit(**values)
+        mujoco.mj_setConst(m, mujoco.MjData(m))
+
+    def _perturb(self, rng: np.random.Generator) -> None:
+        m, c = self.m, self.chair
+        factor = 1.0 + 0.03 * rng.standard_normal()
+        m.body_mass[c] *= factor
+        m.body_inertia[c] *= factor * (1.0 + 0.05 * rng.standard_normal())
+        m.body_ipos[c] += rng.standard_normal(3) * [0.006, 0.001, 0.012]
+        for pair in (WHEELS[:2], WHEELS[2:]):
+            stiff = 1.0 + 0.04 * rng.standard_normal()
+            for w in pair:
+                m.geom_user[self.tire[w], COEFFICIENTS + 3] *= stiff  # a3 of PAC89
+
+    # -- edits of MuJoCo's own model -----------------------------------------------------------
+
+    def _edit_floor_slope(self, x: float, y: float) -> None:
+        g = np.array([-x, -y, -1.0])
+        self.m.opt.gravity[:] = 9.81 * g / np.linalg.norm(g)
+
+    def _turn(self, wheel: str, axis: int, angle: float) -> None:
+        b = self.m.body(wheel).id
+        r = np.zeros(4)
+        by = np.zeros(4)
+        by[0], by[1 + axis] = np.cos(angle / 2), np.sin(angle / 2)
+        mujoco.mju_mulQuat(r, by, self.m.body_quat[b])
+        self.m.body_quat[b] = r
+
+    def _edit_toe(self, symmetric: float = 0.0, asymmetric: float = 0.0) -> None:
+        self._turn("left_wheel", 2, asymmetric - symmetric)
+        self._turn("right_wheel", 2, asymmetric + symmetric)
+
+    def _edit_camber(self, angle: float) -> None:
+        self._turn("left_wheel", 0, angle)
+        self._turn("right_wheel", 0, -angle)
+
+    def _edit_mass_offset(self, x: float = 0.0, y: float = 0.0) -> None:
+        self.m.body_ipos[self.chair, :2] += x, y
+
+    def _edit_payload(self, mass: float, height: float) -> None:
+        m, c = self.m, self.chair
+        rotation = np.zeros(9)
+        mujoco.mju_quat2Mat(rotation, m.body_iquat[c])
+        r = rotation.reshape(3, 3)
+        old = r @ np.diag(m.body_inertia[c]) @ r.T
+        at = np.array([m.body_ipos[c, 0], m.body_ipos[c, 1], height])
+        apart = at - m.body_ipos[c]
+        shared = m.body_mass[c] * mass / (m.body_mass[c] + mass)
+        new = old + shared * (apart @ apart * np.eye(3) - np.outer(apart, apart))
+        w, v = np.linalg.eigh(new)
+        v[:, 0] *= np.sign(np.linalg.det(v))
+        mujoco.mju_mat2Quat(m.body_iquat[c], v.ravel())
+        m.body_inertia[c] = w
+        m.body_ipos[c] += apart * mass / (m.body_mass[c] + mass)
+        m.body_mass[c] += mass
+
+    def _edit_wheel_radius(self, left: float = 0.0, right: float = 0.0) -> None:
+        for w, change in (("left_wheel", left), ("right_wheel", right)):
+            self.m.geom_size[self.tire[w], :2] += change
+            self.m.geom_rbound[self.tire[w]] += change
+
+    def _edit_cornering_stiffness(self, front: float = 0.0, rear: float = 0.0) -> None:
+        for w in WHEELS:
+            factor = 1.0 + (front if "caster" in w else rear)
+            self.m.geom_user[self.tire[w], COEFFICIENTS + 3] *= factor
+
+    def _edit_load_sensitivity(self, exponent: float) -> None:
+        for w in WHEELS:
+            self.m.geom_user[self.tire[w], 12] += exponent
+
+    def _edit_tire_friction(self, factor: float) -> None:
+        for w in WHEELS:
+            self.m.geom_user[self.tire[w], COEFFICIENTS + 2] *= factor  # a2 of PAC89
+
+    def _edit_relaxation_length(self, length: float) -> None:
+        for w in WHEELS:
+            self.m.geom_user[self.tire[w], 4] += length
+
+    def _edit_caster_friction(self, moment: float) -> None:
+        for j in SWIVELS:
+            self.m.dof_frictionloss[self.dof[j]] += moment
+
+    def _edit_caster_trail(self, length: float) -> None:
+        for w in WHEELS[2:]:
+            self.m.body_pos[self.m.body(w).id, 0] -= length
+
+    # -- forces of this file -------------------------------------------------------------------
+
+    def push(self, d: mujoco.MjData, driven: bool) -> None:
+        """Apply the hidden forces for the next step."""
+        d.qfrc_applied[:] = 0.0
+        d.xfrc_applied[self.chair] = 0.0
+        c = self.chair
+        r = d.xmat[c].reshape(3, 3)
+        v = d.qvel[0:3]
+        speed = float(r[:, 0] @ v)
+        yaw = float(d.qvel[5])
+        total = np.zeros(6)
+        for name in self.forces:
+            p = self.hidden[name]
+            getattr(self, f"_force_{name}")(d, p, r, v, speed, yaw, driven, total)
+        d.xfrc_applied[c] = total
+
+    def _force_rolling_resistance(self, d, p, r, v, speed, yaw, driven, total):
+        weight = 9.81 * float(self.m.body_subtreemass[self.chair])
+        total[:3] -= p["coefficient"] * weight * np.tanh(speed / 0.01) * r[:, 0]
+
+    def _force_bearing_friction(self, d, p, r, v, speed, yaw, driven, total):
+        for w in WHEELS[:2]:
+            spin = d.qvel[self.dof[w]]
+            drag = p.get("coulomb", 0.0) * np.tanh(spin / 0.03) + p.get("viscous", 0.0) * spin
+            d.qfrc_applied[self.dof[w]] -= drag
+
+    def _force_air_drag(self, d, p, r, v, speed, yaw, driven, total):
+        total[:2] -= 0.6 * p["drag_area"] * np.hypot(v[0], v[1]) * v[:2]
+
+    def _force_wind(self, d, p, r, v, speed, yaw, driven, total):
+        rel = v[:2] - [p["x"], p["y"]]
+        total[:2] -= 0.6 * 0.6 * np.hypot(*rel) * rel
+
+    def _force_turning_scrub(self, d, p, r, v, speed, yaw, driven, total):
+        total[5] -= p["moment"] * np.tanh(yaw / 0.05)
+
+    def _force_back_emf(self, d, p, r, v, speed, yaw, driven, total):
+        if driven:
+            for w in WHEELS[:2]:
+                d.qfrc_applied[self.dof[w]] -= p["coefficient"] * d.qvel[self.dof[w]]
+
+    def _force_rider_sway(self, d, p, r, v, speed, yaw, driven, total):
+        w = 2 * np.pi * p["frequency"]
+        place = p["amplitude"] * np.sin(w * d.time + p["phase"])
+        force = p["mass"] * w**2 * place
+        total[:3] += force * r[:, 0]
+        arm = 0.9 - d.xipos[self.chair, 2]
+        total[3:] += r[:, 1] * (force * arm + p["mass"] * 9.81 * place)
+
+    def _force_surface_patch(self, d, p, r, v, speed, yaw, driven, total):
+        for w in WHEELS:
+            at = d.geom_xpos[self.tire[w]]
+            if np.hypot(at[0] - p["x"], at[1] - p["y"]) > p["radius"]:
+                continue
+            load = 300.0 if "caster" not in w else 140.0
+            spin = np.tanh(d.qvel[self.dof[w]] / 0.03)
+            d.qfrc_applied[self.dof[w]] -= p["coefficient"] * load * self.m.geom_size[
+                self.tire[w], 0
+            ] * spin
+
+    # outside the library
+    def _force_bent_rim(self, d, p, r, v, speed, yaw, driven, total):
+        angle = d.qpos[int(self.m.joint("left_wheel").qposadr[0])]
+        total[:3] += p["force"] * np.sin(angle) * r[:, 0]
+        total[5] -= 0.28 * p["force"] * np.sin(angle)
+
+    def _force_strap(self, d, p, r, v, speed, yaw, driven, total):
+        catch = 0.5 * (1.0 + np.tanh((abs(speed) - 1.15) / 0.02))
+        total[:3] -= p["force"] * catch * np.sign(speed) * r[:, 0]
+        total[5] += 0.25 * p["force"] * catch * np.sign(speed)
+
+    def _force_gust(self, d, p, r, v, speed, yaw, driven, total):
+        bell = np.exp(-0.5 * ((d.time - p["when"]) / 0.35) ** 2)
+        total[:2] += p["force"] * bell * np.array([np.cos(p["way"]), np.sin(p["way"])])
+
+    def _force_fork_spring(self, d, p, r, v, speed, yaw, driven, total):
+        for j in SWIVELS:
+            q = d.qpos[int(self.m.joint(j).qposadr[0])]
+            d.qfrc_applied[self.dof[j]] -= p["stiffness"] * q
+
+
+SWIVELS = ("left_caster_swivel", "right_caster_swivel")
+COEFFICIENTS = 20  # where a tire's coefficients begin in geom_user
+
+
+def run(world: World, man: Manoeuvre, seconds: float) -> tuple[dict, np.ndarray]:
+    """One run: exact channels at RATE, and the torques that the table will tell."""
+    m = world.m
+    every = round(1.0 / (RATE * STEP))
+    sensors = {n: int(m.sensor(n.partition(".")[0]).adr[0]) for n in NOISE}
+    place = [sensors[n] + "xyz".index(n[-1]) if "." in n else sensors[n] for n in NOISE]
+    rows = []
+    with mjchair.installed():
+        d = start(m, Initial(man.position, man.heading, man.speed, man.yaw))
+        gain = world.hidden.get("torque_gain", {})
+        lag = world.hidden.get("drive_lag", {}).get("time_constant", 0.0)
+        passed = np.zeros(2)
+        told = []
+        for k in range(round(seconds / STEP)):
+            asked = np.array(man.torque(d.time)) if man.torque else np.zeros(2)
+            passed = asked if lag == 0.0 else passed + (asked - passed) * -np.expm1(-STEP / lag)
+            d.ctrl[:2] = passed * [1.0 + gain.get("left", 0.0), 1.0 + gain.get("right", 0.0)]
+            if world.forces:
+                world.push(d, man.torque is not None)
+            now = d.time
+            mujoco.mj_step(m, d)
+            if k % every == 0:
+                told.append([now, *asked])
+                rows.append(d.sensordata[place])
+    return dict(zip(NOISE, np.array(rows).T, strict=True)), np.array(told)
+
+
+def sense(rng: np.random.Generator, case: Case, exact: dict, told: np.ndarray) -> dict:
+    """Faults of sensors, noise, rounding, missing samples."""
+    table = {"time": told[:, 0]}
+    for name, (std, step) in NOISE.items():
+        values = exact[name].copy()
+        if name == case.channel:
+            fault = case.hidden
+            if "sensor_delay" in fault:
+                late = told[:, 0] - fault["sensor_delay"]["delay"]
+                values = np.interp(late, told[:, 0], values)
+            values *= 1.0 + fault.get("sensor_scale", {}).get("scale", 0.0)
+            values += fault.get("sensor_bias", {}).get("bias", 0.0)
+        if "gyro" in name:
+            values += 0.001
+        values += std * rng.standard_normal(values.size)
+        if step:
+            values = step * np.round(values / step)
+        values[rng.random(values.size) < 0.02] = np.nan
+        table[name] = values
+    return table
+
+
+def make(
+    folder: Path,
+    case: Case,
+    seed: int,
+    trials: int = 6,
+    seconds: float = 6.0,
+    channels: tuple[str, ...] | None = None,
+) -> None:
+    """Write a study and its sealed answer."""
+    folder.mkdir(parents=True, exist_ok=True)
+    chosen = [MANOEUVRES[k] for k in _chosen(trials)]
+    if case.kind in ("one", "two", "outside") and case.sigma:
+        _size(case, seed, chosen, seconds)
+    rng = np.random.default_rng([seed, 1])
+    world = World(np.random.default_rng([seed, 2]), case.hidden)
+    lines = ['model = "manual"', 'scene = "flat"', "", "[noise]"]
+    kept = [n for n in NOISE if channels is None or n in channels]
+    lines += [f'"{n}" = {NOISE[n][0]}' for n in kept]
+    for k, man in enumerate(chosen):
+        exact, told = run(world, man, seconds)
+        table = sense(rng, case, exact, told)
+        table = {n: v for n, v in table.items() if n == "time" or n in kept}
+        if man.torque:
+            table["left_wheel"], table["right_wheel"] = told[:, 1], told[:, 2]
+        file = f"{man.name}_{k}.csv"
+        _write(folder / file, table)
+        lines += ["", "[[trial]]", f'file = "{file}"', f'manoeuvre = "{man.name}"']
+    (folder / "study.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    seal(folder / SEAL, case)
+
+
+def _chosen(trials: int) -> list[int]:
+    return {3: [0, 3, 4], 4: [0, 1, 3, 4]}.get(trials, [k % 6 for k in range(trials)])
+
+
+def _write(path: Path, table: dict[str, np.ndarray]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(table)
+        for row in zip(*table.values(), strict=True):
+            writer.writerow(["" if np.isnan(x) else repr(float(round(x, 7))) for x in row])
+
+
+def seal(path: Path, case: Case) -> None:
+    """Hide the answer from a casual look."""
+    text = json.dumps({"kind": case.kind, "hidden": case.hidden, "sigma": case.sigma,
+                       "channel": case.channel})
+    path.write_bytes(base64.b64encode(zlib.compress(text.encode())))
+
+
+def unseal(path: Path) -> dict:
+    """The answer."""
+    return json.loads(zlib.decompress(base64.b64decode(path.read_bytes())))
+
+
+# -- sizes ---------------------------------------------------------------------------------------
+
+LINEAR = {  # channel -> order of the polynomial that a free initial state takes from a window
+    "position": 1, "heading": 1, "angle": 1, "speed": 0, "gyro": 0, "accelerometer": -1,
+}
+
+
+def detectability(with_it: list[dict], without: list[dict]) -> float:
+    """Sigmas by which two sets of exact runs differ, once each 2 s starts afresh."""
+    total = 0.0
+    for a, b in zip(with_it, without, strict=True):
+        n = len(next(iter(a.values())))
+        for first in range(0, n, 2 * RATE):
+            rows = slice(first, min(first + 2 * RATE, n))
+            for name, (std, _) in NOISE.items():
+                order = next((o for end, o in LINEAR.items() if end in name), 0)
+                x = (a[name] - b[name])[rows]
+                if "heading" in name:
+                    x = np.angle(np.exp(1j * x))
+                t = np.arange(x.size)
+                if order >= 0 and "caster" not in name:
+                    x = x - np.polyval(np.polyfit(t, x, order), t)
+                total += float(x @ x) / std**2
+    return float(np.sqrt(total))
+
+
+def _size(case: Case, seed: int, chosen: list[Manoeuvre], seconds: float) -> None:
+    """Scale what is hidden until it shows at about case.sigma."""
+    plain = World(np.random.default_rng([seed, 2]), {})
+    without = [run(plain, man, seconds)[0] for man in chosen]
+    for name in case.hidden:
+        if name.startswith("sensor"):
+            only = Case("one", {name: case.hidden[name]}, 0.0, case.channel)
+            exact = [_fault(only, e) for e in without]
+        else:
+            world = World(np.random.default_rng([seed, 2]), {name: case.hidden[name]})
+            exact = [run(world, man, seconds)[0] for man in chosen]
+        seen = detectability(exact, without)
+        scale(case.hidden[name], name, np.clip(case.sigma / max(seen, 1e-6), 0.02, 30.0))
+
+
+def _fault(case: Case, exact: dict) -> dict:
+    out = dict(exact)
+    time = np.arange(len(exact[case.channel])) / RATE
+    values = exact[case.channel]
+    p = next(iter(case.hidden.values()))
+    values = np.interp(time - p.get("delay", 0.0), time, values)
+    out[case.channel] = values * (1.0 + p.get("scale", 0.0)) + p.get("bias", 0.0)
+    return out
+
+
+MOST = {  # beyond these the chair is another vehicle
+    "toe": 0.08, "camber": 0.25, "wheel_radius": 0.02, "mass_offset": 0.08, "payload": 40.0,
+    "cornering_stiffness": 0.7, "load_sensitivity": 0.6, "relaxation_length": 0.5,
+    "caster_trail": 0.05, "torque_gain": 0.5, "drive_lag": 0.4, "sensor_scale": 0.5,
+    "sensor_delay": 0.2, "rolling_resistance": 0.05, "floor_slope": 0.06, "wind": 8.0,
+    "air_drag": 4.0, "rider_sway": 0.15, "turning_scrub": 15.0, "caster_friction": 4.0,
+    "surface_patch": 0.2, "back_emf": 2.0,
+}
+
+
+def scale(p: dict[str, float], name: str, factor: float) -> None:
+    """Scale the size of an effect, not its place or time."""
+    fixed = {
+        "surface_patch": ("x", "y", "radius"),
+        "rider_sway": ("mass", "frequency", "phase"),
+        "payload": ("height",),
+        "gust": ("when", "way"),
+    }.get(name, ())
+    most = MOST.get(name, np.inf)
+    for key in p:
+        if key in fixed:
+            continue
+        if name == "wind":
+            factor_here = np.sqrt(factor)
+        else:
+            factor_here = factor
+        if name == "tire_friction":
+            p[key] = float(np.clip(1.0 - (1.0 - p[key]) * factor, 0.08, 0.9))
+        else:
+            p[key] = float(np.clip(p[key] * factor_here, -most, most))

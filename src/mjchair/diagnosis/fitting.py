@@ -1,0 +1,273 @@
+"""A chair with its nuisances and effects at given values, and the nonlinear fit of those values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.diagnosis import linear, sensitivity
+from mjchair.diagnosis.linear import System, Whitener
+from mjchair.diagnosis.noise import Noise
+from mjchair.diagnosis.nuisance import Nuisance
+from mjchair.diagnosis.observe import Observer
+from mjchair.diagnosis.sensitivity import Column, Point
+from mjchair.diagnosis.shooting import Shooter
+from mjchair.diagnosis.tracking import Track, track
+from mjchair.effects.effect import Effect, Values, clip
+
+Array = NDArray[np.float64]
+FARTHEST = 2.0  # prior standard deviations that a nuisance is moved before it is linear again
+SENSOR = {"sensor_bias": "bias", "sensor_scale": "scale", "sensor_delay": "delay"}
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect with its values; `free` are the parameters that a fit moves."""
+
+    effect: Effect
+    values: Values
+    free: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A chair: nuisances in prior standard deviations, and effects.
+
+    Attributes:
+      nuisances: all of the study. offsets: name -> standard deviations, mechanical ones only.
+      terms: the effects that are in it.
+    """
+
+    nuisances: tuple[Nuisance, ...]
+    offsets: dict[str, float] = field(default_factory=dict)
+    terms: tuple[Term, ...] = ()
+
+    def edit(self, spec: mujoco.MjSpec) -> None:
+        """Make the chair of the study's chair."""
+        for n in self.nuisances:
+            if n.edit is not None and self.offsets.get(n.name):
+                n.edit(spec, self.offsets[n.name] * n.std)
+        for term in self.terms:
+            if term.effect.name not in SENSOR:
+                term.effect.apply(spec, term.values)
+
+    def observer(self, channels: Sequence[str]) -> Observer:
+        """Its sensors."""
+        found: dict[str, dict[str, float]] = {"bias": {}, "scale": {}, "delay": {}}
+        for term in self.terms:
+            if term.effect.name in SENSOR and term.effect.channel:
+                kind = SENSOR[term.effect.name]
+                found[kind][term.effect.channel] = term.values[kind]
+        return Observer(channels, **found)
+
+
+@dataclass
+class Bench:
+    """What every stage works with.
+
+    Attributes:
+      shooter: simulates. noise: of the channels. nuisances: of the study. whitener: of the noise.
+    """
+
+    shooter: Shooter
+    noise: dict[str, Noise]
+    nuisances: tuple[Nuisance, ...]
+    whitener: Whitener
+
+    @property
+    def windows(self) -> NDArray[np.int64]:
+        """Indices of the windows that may be fitted to."""
+        fitted = set(self.shooter.study.fitted)
+        return np.array([i for i, w in enumerate(self.shooter.windows) if w.run in fitted])
+
+
+def nuisance_columns(bench: Bench, found: Track, fit: Fit) -> dict[str, Column]:
+    """Columns of all nuisances and of the two differences to a finer simulation."""
+    mechanical = [n for n in bench.nuisances if n.edit is not None]
+    points = [
+        *sensitivity.nuisance_points(mechanical),
+        Point(sensitivity.half_step, 1.5, fine=True),
+        Point(sensitivity.other_integrator, 1.5, fine=True),
+    ]
+    observer = fit.observer(bench.shooter.channels)
+    columns = sensitivity.differences(bench.shooter, found, points, fit.edit, observer)
+    names = [*(n.name for n in mechanical), "half_step", "integrator"]
+    out = dict(zip(names, columns, strict=True))
+    late = 0.5 * bench.shooter.input_step()
+    if late > 0.0 and found.coarse is not None:
+        # a torque that changes between two samples is known to within half of their distance
+        model = bench.shooter.compile(fit.edit, coarse=True)
+        shifted = sensitivity.predictions(bench.shooter, found, model, observer, late)
+        out["input_timing"] = [a - b for a, b in zip(shifted, found.coarse, strict=True)]
+    for n in bench.nuisances:
+        if n.edit is None:
+            out[n.name] = sensitivity.sensor_column(
+                bench.shooter, found, "sensor_bias", n.channel, n.std
+            )
+    return out
+
+
+def term_columns(bench: Bench, found: Track, fit: Fit) -> dict[str, Column]:
+    """One column a free parameter of the fit's effects, in units of its typical change."""
+    out: dict[str, Column] = {}
+    points, names = [], []
+    observer = fit.observer(bench.shooter.channels)
+    for term in fit.terms:
+        for name in term.free:
+            key = f"{term.effect.key}.{name}"
+            size = change(term.effect, name)
+            if term.effect.name in SENSOR:
+                out[key] = sensitivity.sensor_column(
+                    bench.shooter, found, term.effect.name, str(term.effect.channel), size
+                )
+                continue
+            share = 0.25 * size
+            p = term.effect.parameter(name)
+            if not p.low <= term.values[name] + share <= p.high:
+                share = -share
+            names.append(key)
+            points.append(Point(_shifted(fit, term, name, share), size / share))
+    if points:
+        # a point here is a whole chair, so nothing comes before its edit
+        base = sensitivity.predictions(
+            bench.shooter, found, bench.shooter.compile(fit.edit, coarse=True), observer
+        )
+        for key, point in zip(names, points, strict=True):
+            model = bench.shooter.compile(point.edit, coarse=True)
+            edited = sensitivity.predictions(bench.shooter, found, model, observer)
+            out[key] = [point.factor * (e - y) for e, y in zip(edited, base, strict=True)]
+    return {k: out[k] for t in fit.terms for k in (f"{t.effect.key}.{n}" for n in t.free)}
+
+
+def change(effect: Effect, name: str) -> float:
+    """The typical change of a parameter, away from neutral."""
+    p = effect.parameter(name)
+    typical = p.typical - p.neutral
+    if abs(typical) > 0.0:
+        return abs(typical)
+    return {"Hz": 0.05, "rad": 0.3}.get(p.unit, 0.1)
+
+
+def _shifted(fit: Fit, term: Term, name: str, by: float):  # type: ignore[no-untyped-def]
+    values = {**term.values, name: term.values[name] + by}
+    terms = tuple(Term(t.effect, values, t.free) if t is term else t for t in fit.terms)
+    return Fit(fit.nuisances, fit.offsets, terms).edit
+
+
+@dataclass
+class Fitted:
+    """A fit with its track and the linear system around it.
+
+    Attributes:
+      fit, track: where the system is linear. columns: of nuisances and terms.
+      system: nuisances first, then a column a free parameter.
+      chi2: (windows,) with the last linear step put in. std: term key -> standard deviation, SI.
+      at_bound: parameters that ended on a bound.
+    """
+
+    fit: Fit
+    track: Track
+    columns: dict[str, Column]
+    system: System
+    chi2: Array
+    std: dict[str, float]
+    at_bound: tuple[str, ...]
+
+    @property
+    def total(self) -> float:
+        """Chi2 of the windows fitted to, with the priors of the nuisances."""
+        return float(self.chi2.sum())
+
+
+def solve(system: System, windows: NDArray[np.int64]) -> Array:
+    """Coefficients (p,) of all columns."""
+    n, back = system.nuisance, system.back
+    G, b = system.G[windows].sum(axis=0), system.b[windows].sum(axis=0)
+    size = np.maximum(np.diag(G), 1e-12)
+    precision = np.r_[np.ones(n), 1e-8 * size[n:]]
+    b = b - np.r_[back, np.zeros(len(b) - n)]
+    return np.asarray(np.linalg.solve(G + np.diag(precision), b))
+
+
+def refit(
+    bench: Bench,
+    start: Fit,
+    before: Track | None,
+    nuisances: dict[str, Column] | None = None,
+    rounds: int = 2,
+) -> Fitted:
+    """Nonlinear fit of nuisances and effects within bounds, by Gauss-Newton.
+
+    Args:
+      start: where to begin. before: a track of a chair that is not far.
+      nuisances: columns to use throughout; None: made anew in every round. They change little, and
+        the residual, which decides where the fit ends, is always new.
+    """
+    fit = start
+    found = before
+    shooter = bench.shooter
+    for turn in range(rounds + 1):
+        model = shooter.compile(fit.edit)
+        found = track(shooter, model, bench.noise, fit.observer(shooter.channels), found)
+        columns = dict(nuisances or nuisance_columns(bench, found, fit))
+        count = len(columns)
+        columns.update(term_columns(bench, found, fit))
+        system = linear.build(
+            shooter, found, bench.noise, columns, count, bench.whitener, fit.offsets
+        )
+        step = solve(system, bench.windows)
+        if turn == rounds:
+            break
+        moved = _moved(fit, system, step)
+        small = np.abs(step[count:]) < 0.02 * np.maximum(_spread(system, bench.windows)[count:], 1e-9)
+        if turn and small.all():
+            break
+        fit = moved
+    chi2 = np.array([linear.chi2(system, i, step) for i in bench.windows])
+    spread = _spread(system, bench.windows)
+    std, bound = {}, []
+    for k, key in enumerate(system.names[count:]):
+        term, name = _term(fit, key)
+        std[key] = float(spread[count + k]) * change(term.effect, name)
+        p = term.effect.parameter(name)
+        if term.values[name] in (p.low, p.high) and not p.low == p.neutral == term.values[name]:
+            bound.append(key)
+    return Fitted(fit, found, columns, system, chi2, std, tuple(bound))
+
+
+def _spread(system: System, windows: NDArray[np.int64]) -> Array:
+    n = system.nuisance
+    G = system.G[windows].sum(axis=0)
+    size = np.maximum(np.diag(G), 1e-12)
+    full = G + np.diag(np.r_[np.ones(n), 1e-8 * size[n:]])
+    scale = np.sqrt(np.diag(full))
+    inverse = np.linalg.inv(full / np.outer(scale, scale))
+    return np.asarray(np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale)
+
+
+def _term(fit: Fit, key: str) -> tuple[Term, str]:
+    effect, _, name = key.rpartition(".")
+    return next(t for t in fit.terms if t.effect.key == effect), name
+
+
+def _moved(fit: Fit, system: System, step: Array) -> Fit:
+    offsets = dict(fit.offsets)
+    mechanical = {n.name for n in fit.nuisances if n.edit is not None}
+    for name, by in zip(system.names[: system.nuisance], step, strict=False):
+        if name in mechanical:
+            offsets[name] = float(np.clip(offsets.get(name, 0.0) + by, -FARTHEST, FARTHEST))
+    terms = []
+    for term in fit.terms:
+        values = dict(term.values)
+        for name in term.free:
+            by = step[system.names.index(f"{term.effect.key}.{name}")]
+            p = term.effect.parameter(name)
+            size = change(term.effect, name)
+            limit = 0.3 * size if name in ("frequency",) else 1e9
+            values[name] = clip(p, values[name] + float(np.clip(by * size, -limit, limit)))
+        terms.append(Term(term.effect, values, term.free))
+    return Fit(fit.nuisances, offsets, tuple(terms))
