@@ -1,6 +1,9 @@
 """mjchair: a wheelchair simulator on MuJoCo with Magic Formula tires."""
 
 from mjchair import tire
+from mjchair.diagnosis.study import read_study
+from mjchair.diagnosis.verdict import Diagnosis
+from mjchair.diagnosis.workflow import diagnose
 from mjchair.engine.install import install, installed, uninstall
 from mjchair.errors import MjchairError
 from mjchair.model.spec import load_spec
@@ -10,18 +13,21 @@ from mjchair.simulation.recording import Recording, Status, load_recording
 from mjchair.simulation.simulate import simulate
 
 __all__ = [
+    "Diagnosis",
     "Initial",
     "Inputs",
     "MjchairError",
     "Recording",
     "Status",
     "constant",
+    "diagnose",
     "install",
     "installed",
     "load_recording",
     "load_spec",
     "push_strokes",
     "read_inputs",
+    "read_study",
     "simulate",
     "tire",
     "uninstall",

@@ -8,10 +8,10 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from mjchair.commands import fit_tire, models, render, rig, simulate, sweep, view
+from mjchair.commands import diagnose, fit_tire, hide, models, render, rig, simulate, sweep, view
 from mjchair.errors import MjchairError
 
-COMMANDS = (simulate, render, view, models, rig, fit_tire, sweep)
+COMMANDS = (simulate, render, view, models, rig, fit_tire, sweep, diagnose, hide)
 BAD_INPUT = 2
 INTERRUPTED = 130  # as shells have it: 128 + SIGINT
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from mjchair.diagnosis.chair import Chair, State
+from mjchair.diagnosis.store import Store
 from mjchair.diagnosis.study import Run, Study
 from mjchair.diagnosis.windows import Window, cut
 from mjchair.effects import rider_sway
@@ -72,8 +73,14 @@ class Shooter:
       study, channels, windows: what is simulated. step: of the simulation, s.
     """
 
-    def __init__(self, study: Study, windows: Sequence[Window] | None = None) -> None:
-        """Cut the runs and tabulate their inputs."""
+    def __init__(
+        self,
+        study: Study,
+        windows: Sequence[Window] | None = None,
+        store: Store | None = None,
+    ) -> None:
+        """Cut the runs; simulations are kept in the store, where there is one."""
+        self.store = store
         self.study = study
         self.channels = study.channels
         self.spec = stripped(study.spec)

@@ -91,7 +91,7 @@ def track(
 
     Args:
       model: of any size; states are those of the base model. before: a track to start from, of a
-        model that is not far; one round is enough then.
+        model that is not far.
     """
     chair = shooter.chair
     coarse = copy.copy(model)
@@ -116,8 +116,7 @@ def track(
                     states[i] = before.states[i].copy()
                 elif states[i] is None:
                     states[i] = firsts[w.run].copy()
-            rounds = ROUNDS if before is None else 1
-            for _ in range(rounds):
+            for _ in range(ROUNDS):
                 _fit_round(
                     shooter,
                     chair,

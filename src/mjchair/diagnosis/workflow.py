@@ -14,6 +14,7 @@ from scipy import stats
 
 from mjchair.diagnosis import candidates, force, linear, noise, nuisance, selection, sensitivity
 from mjchair.diagnosis import gap as gaps
+from mjchair.diagnosis.blas import one_thread
 from mjchair.diagnosis.candidates import Start
 from mjchair.diagnosis.experiments import suggest
 from mjchair.diagnosis.fitting import Bench, Fit, Fitted, nuisance_columns, refit, solve
@@ -22,6 +23,7 @@ from mjchair.diagnosis.linear import Reduced, System, Whitener
 from mjchair.diagnosis.selection import Hypothesis
 from mjchair.diagnosis.sensitivity import Column, Pulse
 from mjchair.diagnosis.shooting import Shooter
+from mjchair.diagnosis.store import Store
 from mjchair.diagnosis.study import Study, read_study
 from mjchair.diagnosis.tracking import Track, track
 from mjchair.diagnosis.verdict import (
@@ -74,9 +76,11 @@ def silent(_: str) -> None:
     """Say nothing."""
 
 
-def prepare(study: Study, say: Say = silent) -> tuple[Bench, Fit, Track]:
+def prepare(
+    study: Study, say: Say = silent, store: Store | None = None
+) -> tuple[Bench, Fit, Track]:
     """Windows, noise and nuisances: a chair that is as right as it can be without any effect."""
-    shooter = Shooter(study)
+    shooter = Shooter(study, store=store)
     found = noise.estimate(study)
     say("states along the runs")
     first = track(shooter, shooter.base, found)
@@ -164,6 +168,7 @@ def diagnose(
     *,
     effects: Sequence[Effect] = (),
     say: Say = silent,
+    store: Store | None = None,
 ) -> Diagnosis:
     """Find where model and measurement disagree, and name the effect that is missing.
 
@@ -171,12 +176,20 @@ def diagnose(
       study: a study, or its folder.
       effects: of your own, besides the library's.
       say: is called with the name of every stage as it begins.
+      store: keeps simulations, so that a second start goes on from an interrupted one.
 
     Raises:
       MjchairError: a study that cannot be read or simulated, as one line.
     """
     known = study if isinstance(study, Study) else read_study(study)
-    bench, fit, found = prepare(known, say)
+    with one_thread():
+        return _diagnose(known, effects, say, store)
+
+
+def _diagnose(
+    known: Study, effects: Sequence[Effect], say: Say, store: Store | None
+) -> Diagnosis:
+    bench, fit, found = prepare(known, say, store)
     base = screen_columns(bench, fit, found, study_effects(known, effects), say)
     say("the gap")
     gap = gaps.test_gap(bench, base.system, base.reduced)
@@ -324,7 +337,6 @@ def _finish(
     say: Say,
     chosen: Hypothesis | None = None,
 ) -> Diagnosis:
-    bench = base.bench
     closed = closure(gap, base, fitted, after[-1]) if fitted is not None and after else 0.0
     ranked = _ranked(base, gap, chosen)
     sure = fitted is not None and all(s > SIGMAS for s in _sigmas(fitted))
@@ -347,8 +359,7 @@ def _finish(
                 alternatives.append(list(names))
     advice = ""
     if verdict == AMBIGUOUS and chosen is not None and fitted is not None:
-        say("the experiment that would decide")
-        advice = suggest(bench, base.fit, fitted, [h for group in rivals for h in group], base.reduced)
+        advice = suggest(name for group in alternatives for name in group)
     elif verdict == UNKNOWN:
         advice = (
             "Repeat the run with the largest gap without changes: what comes back at the same "

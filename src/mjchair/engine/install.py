@@ -1,8 +1,8 @@
 """Put the tire callbacks in place, and take them out again.
 
 MuJoCo's callbacks are global to the process. `mjcb_act_dyn`, `mjcb_sensor` and `mjcb_act_bias`
-are used; `mjcb_control` and the others stay the user's. Models without tires are untouched: their user
-actuators and user sensors find nothing of ours to do.
+are used; `mjcb_control` and the others stay the user's. Models without tires are untouched: their
+user actuators and user sensors find nothing of ours to do.
 """
 
 from __future__ import annotations

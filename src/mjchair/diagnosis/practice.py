@@ -1,0 +1,122 @@
+"""Practice studies: an effect hidden in simulated runs, the answer sealed beside them."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import io
+import json
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from mjchair.effects.effect import Effect
+from mjchair.errors import MjchairError
+from mjchair.model.spec import load_spec
+from mjchair.simulation.inputs import Inputs, push_strokes
+from mjchair.simulation.recording import Recording
+from mjchair.simulation.simulate import simulate
+from mjchair.storage import write_whole
+
+SEAL = "answer.sealed"
+RATE, SECONDS = 100.0, 6.0  # Hz, s
+NOISE = {  # SI; sizes of encoders, a small IMU and motion capture; assumed
+    "left_wheel_speed": 0.05,
+    "right_wheel_speed": 0.05,
+    "imu_gyro.z": 0.02,
+    "imu_accelerometer.x": 0.3,
+    "position.x": 0.01,
+    "position.y": 0.01,
+    "heading": 0.01,
+}
+
+
+def _slalom() -> Inputs:
+    time = np.arange(0.0, SECONDS, 0.01)
+    swing = 4.0 * np.sin(2.0 * np.pi * 0.4 * time)
+    return Inputs(time, {"left_wheel": 2.0 + swing, "right_wheel": 2.0 - swing}, "slalom")
+
+
+def runs() -> list[tuple[str, dict[str, object], Inputs | None]]:
+    """The manoeuvres: word, how it starts, what drives it."""
+    strokes = push_strokes({"left_wheel": 12.0, "right_wheel": 12.0}, SECONDS)
+    return [
+        ("coast", {"speed": 1.8, "heading": 0.0, "position": (0.0, 0.0)}, None),
+        ("coast", {"speed": 1.4, "heading": np.pi, "position": (6.0, 0.0)}, None),
+        ("turn", {"speed": 1.3, "heading": 0.5, "yaw_rate": 0.5}, None),
+        ("push", {"speed": 0.8, "heading": 1.2}, strokes),
+        ("slalom", {"speed": 1.0, "heading": -0.6}, _slalom()),
+    ]
+
+
+def hide(
+    effect: Effect,
+    folder: Path,
+    values: Mapping[str, float] | None = None,
+    seed: int = 0,
+    model: str = "manual",
+) -> None:
+    """Write a study with the effect hidden in it, and the sealed answer.
+
+    Args:
+      values: parameters; None: typical ones. seed: of noise and of what is only roughly known.
+
+    Raises:
+      MjchairError: a sensor effect of a channel that is not written, or values out of bounds.
+    """
+    rng = np.random.default_rng(seed)
+    chosen = dict(values) if values else _typical(effect)
+    if effect.channel and effect.channel not in NOISE:
+        raise MjchairError(
+            f"a practice study has no channel {effect.channel}; it has {', '.join(NOISE)}"
+        )
+    spec = load_spec(model)
+    effect.apply(spec, chosen)
+    lines = [f'model = "{model}"', 'scene = "flat"', "", "[noise]"]
+    lines += [f'"{name}" = {std}' for name, std in NOISE.items()]
+    for k, (word, initial, inputs) in enumerate(runs()):
+        recording = simulate(
+            spec, inputs, SECONDS, initial=initial, timestep=0.001, sample_rate=RATE
+        )
+        file = f"{word}_{k}.csv"
+        write_whole(folder / file, _table(recording, inputs, rng))
+        lines += ["", "[[trial]]", f'file = "{file}"', f'manoeuvre = "{word}"']
+    write_whole(folder / "study.toml", "\n".join(lines) + "\n")
+    answer = json.dumps({"effect": effect.name, "channel": effect.channel, "values": chosen})
+    write_whole(folder / SEAL, base64.b64encode(zlib.compress(answer.encode())))
+
+
+def reveal(folder: Path) -> dict[str, object]:
+    """The sealed answer of a practice study.
+
+    Raises:
+      MjchairError: there is none.
+    """
+    path = folder / SEAL
+    if not path.is_file():
+        raise MjchairError(f"no sealed answer {path}; `mjchair hide` makes one")
+    return dict(json.loads(zlib.decompress(base64.b64decode(path.read_bytes()))))
+
+
+def _typical(effect: Effect) -> dict[str, float]:
+    if effect.name == "rider_sway":
+        return {"mass": 40.0, "amplitude": 0.03, "frequency": 0.9, "phase": 0.5}
+    if effect.name == "surface_patch":
+        return {"x": 3.0, "y": 0.0, "radius": 0.6, "coefficient": 0.03}
+    first = effect.fitted[0]
+    return {**effect.neutral(), first.name: first.typical}
+
+
+def _table(recording: Recording, inputs: Inputs | None, rng: np.random.Generator) -> str:
+    out = io.StringIO()
+    writer = csv.writer(out)
+    columns = {n: np.asarray(recording.channels[n]) for n in NOISE}
+    columns = {n: v + NOISE[n] * rng.standard_normal(v.size) for n, v in columns.items()}
+    if inputs is not None:
+        columns |= {n: inputs.at(n, recording.time) for n in inputs.controls}
+    writer.writerow(["time", *columns])
+    for k, time in enumerate(recording.time):
+        writer.writerow([repr(round(float(v), 7)) for v in (time, *(c[k] for c in columns.values()))])
+    return out.getvalue()
