@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 import os
 import platform
 import shutil
@@ -17,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -356,6 +358,7 @@ def dask(study: object, first: list) -> list[Line]:
     from mjchair import sweep
     from mjchair.sweep.chunk import run_chunk
 
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with (
         LocalCluster(
             n_workers=1,
@@ -399,6 +402,7 @@ def crowd(count: int) -> mujoco.MjModel:
     """A scene of several chairs, 3 m apart."""
     chair = without_looks(mjchair.load_spec())
     parent = mujoco.MjSpec()
+    parent.nuser_sensor, parent.visual.map.zfar = 2, chair.visual.map.zfar
     for name in ("timestep", "integrator", "cone", "tolerance"):
         setattr(parent.option, name, getattr(chair.option, name))
     floor = next(g for g in chair.geoms if g.name == "floor")
@@ -408,7 +412,9 @@ def crowd(count: int) -> mujoco.MjModel:
         one.delete(one.geom("floor"))
         frame = parent.worldbody.add_frame(pos=(3.0 * (k % 4), 3.0 * (k // 4), 0.0))
         parent.attach(one, prefix=f"chair_{k}/", frame=frame)
-    return parent.compile()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return parent.compile()
 
 
 def crowds() -> list[Line]:
@@ -505,6 +511,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS))
     args = parser.parse_args()
     told, lines = machine(), []
+    logging.getLogger("absl").setLevel(logging.ERROR)  # dm_control's echo of MuJoCo's warnings
     width = shutil.get_terminal_size((100, 24)).columns
     for name in args.only:
         for line in PARTS[name]():
