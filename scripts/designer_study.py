@@ -72,16 +72,28 @@ def curves(axes, table, measure, factor):
     styles = {0.05: ":", 0.0625: "--", 0.075: "-"}
     for pressure, colour in colours.items():
         for radius, style in styles.items():
-            chosen = table[(table.tire_pressure == pressure) & (table.caster_radius == radius)]
-            axes.plot(100.0 * chosen.axle_position, factor * chosen[measure], style, color=colour)
+            chosen = (table["tire_pressure"] == pressure) & (table["caster_radius"] == radius)
+            x, y = 100.0 * table["axle_position"][chosen], factor * table[measure][chosen]
+            axes.plot(x, y, style, color=colour)
     axes.grid(alpha=0.3)
+
+
+def on_floor(table, coefficient):
+    """The rows of one floor."""
+    chosen = table["surface_patch.coefficient"] == coefficient
+    return {name: values[chosen] for name, values in table.items()}
+
+
+def columns(table):
+    """A sweep's table as arrays by name."""
+    return {name: np.asarray(table[name]) for name in table.column_names}
 
 
 def figure(coast, turn):
     drawn, grid = plt.subplots(2, 2, figsize=(10.5, 7.5), sharex=True, sharey="row")
     drawn.set_layout_engine("constrained")
     for column, (coefficient, floor) in enumerate(FLOORS.items()):
-        rows = [t[t["surface_patch.coefficient"] == coefficient] for t in (coast, turn)]
+        rows = [on_floor(table, coefficient) for table in (coast, turn)]
         curves(grid[0, column], rows[0], "deceleration", MASS)
         curves(grid[1, column], rows[1], "energy_per_turn", 1.0)
         grid[0, column].set_title(floor)
@@ -108,13 +120,15 @@ def main() -> None:
     parser.add_argument("--scheduler", help="of a Dask cluster")
     args = parser.parse_args()
     tables = {
-        name: sweep.run(
-            study,
-            args.out / name,
-            threads=args.threads,
-            scheduler=args.scheduler,
-            progress=True,
-        ).to_pandas()
+        name: columns(
+            sweep.run(
+                study,
+                args.out / name,
+                threads=args.threads,
+                scheduler=args.scheduler,
+                progress=True,
+            )
+        )
         for name, study in studies().items()
     }
     save(figure(tables["coast"], tables["turn"]), args.out / "designer_study.png")

@@ -101,3 +101,10 @@ def test_compiled_code_is_found_again_by_another_process():
     code = "from mjchair.engine import native; print([f.cache_hits for f in native.callbacks()])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert set(eval(found.stdout)) == {1}
+
+
+def test_load_spec_works_with_python_callbacks_in_place():
+    mjchair.install(compiled=False)
+    before = mujoco.get_mjcb_act_dyn()
+    assert mjchair.load_spec().compile is not None
+    assert mujoco.get_mjcb_act_dyn() is before

@@ -1,5 +1,8 @@
 """mjchair: a wheelchair simulator on MuJoCo with Magic Formula tires."""
 
+import importlib
+from typing import Any
+
 from mjchair import tire
 from mjchair.diagnosis.study import read_study
 from mjchair.diagnosis.verdict import Diagnosis
@@ -32,3 +35,12 @@ __all__ = [
     "tire",
     "uninstall",
 ]
+
+LATER = ("sweep", "tasks")  # imported when first asked for: they bring dm_control and pyarrow
+
+
+def __getattr__(name: str) -> Any:
+    """`mjchair.tasks` and `mjchair.sweep` without an import of their own."""
+    if name in LATER:
+        return importlib.import_module(f"mjchair.{name}")
+    raise AttributeError(f"module 'mjchair' has no attribute {name!r}")

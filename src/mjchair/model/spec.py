@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import FunctionType
 from xml.etree import ElementTree
 
 import mujoco
@@ -127,9 +128,30 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
       MjchairError: MuJoCo refuses the specification, in its own words on one line.
     """
     try:
-        return spec.compile()
+        with _without_callbacks():
+            return spec.compile()
     except ValueError as error:
         raise MjchairError(f"the model does not compile: {_one_line(error)}") from None
+
+
+CALLBACKS = ("act_dyn", "act_bias", "sensor")
+
+
+@contextmanager
+def _without_callbacks() -> Iterator[None]:
+    """Python callbacks out inside the block: MuJoCo's compiler calls them, and fails then.
+
+    Native ones stay: simulations on other threads may be running on them.
+    """
+    found = {name: getattr(mujoco, f"get_mjcb_{name}")() for name in CALLBACKS}
+    before = {name: call for name, call in found.items() if isinstance(call, FunctionType)}
+    try:
+        for name in before:
+            getattr(mujoco, f"set_mjcb_{name}")(None)
+        yield
+    finally:
+        for name, callback in before.items():
+            getattr(mujoco, f"set_mjcb_{name}")(callback)
 
 
 def _one_line(error: Exception) -> str:
@@ -160,7 +182,7 @@ def _place(chair: mujoco.MjSpec, scene: mujoco.MjSpec) -> mujoco.MjSpec:
         body.pos, body.quat = _carried(floor, body.pos, body.quat)
     chair.default.name = f"{chair.modelname}_default"  # without a name it could not be saved
     folder = chair.modelfiledir
-    with _silent():
+    with _silent(), _without_callbacks():
         scene.attach(chair, frame=scene.worldbody.add_frame(), prefix="")
         scene.modelname = f"{chair.modelname} on {scene.modelname}"
         compile_spec(scene)

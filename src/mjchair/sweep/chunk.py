@@ -17,7 +17,7 @@ from mujoco import batch
 from numpy.typing import NDArray
 
 from mjchair.effects import library
-from mjchair.engine.install import installed
+from mjchair.engine.install import install
 from mjchair.errors import MjchairError
 from mjchair.model.looks import without_looks
 from mjchair.model.spec import compile_spec, load_spec
@@ -85,6 +85,9 @@ def run_chunk(
 ) -> list[dict[str, Any]]:
     """Simulate cases of a study.
 
+    The native callbacks are put in place, and stay: several chunks may run at once on the threads
+    of a Dask worker, and none may take them from under another.
+
     Args:
       study: for duration, drive and measures. cases: what to run.
       first: number of the first case in the study. threads: 0 for all processors.
@@ -97,13 +100,13 @@ def run_chunk(
       MjchairError: a case that cannot be built.
     """
     rows: list[dict[str, Any]] = []
-    with installed():
-        models = [_chair(key(case)) for case in cases]
-        for group in _groups(models):
-            chosen = [cases[i] for i in group]
-            outcome = _simulate(study, chosen, [models[i] for i in group], threads)
-            for i, case, found in zip(group, chosen, outcome, strict=True):
-                rows.append({"case": first + i, **case, **found})
+    install()
+    models = [_chair(key(case)) for case in cases]
+    for group in _groups(models):
+        chosen = [cases[i] for i in group]
+        outcome = _simulate(study, chosen, [models[i] for i in group], threads)
+        for i, case, found in zip(group, chosen, outcome, strict=True):
+            rows.append({"case": first + i, **case, **found})
     return sorted(rows, key=lambda row: int(row["case"]))
 
 

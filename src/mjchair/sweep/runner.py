@@ -9,6 +9,7 @@ from typing import Any
 import pyarrow
 from tqdm import tqdm
 
+from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
 from mjchair.sweep.chunk import run_chunk
 from mjchair.sweep.dataset import Dataset, read
@@ -68,8 +69,9 @@ def run(
 
 
 def _here(study: Study, chunks: list[Chunk], threads: int) -> Iterator[Done]:
-    for first, cases in chunks:
-        yield first, run_chunk(study, cases, first, threads)
+    with installed():
+        for first, cases in chunks:
+            yield first, run_chunk(study, cases, first, threads)
 
 
 def _on_dask(study: Study, chunks: list[Chunk], threads: int, scheduler: str) -> Iterator[Done]:

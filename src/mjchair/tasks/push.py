@@ -75,7 +75,7 @@ class Push(ChairTask):
 
     def action_spec(self, physics: Physics) -> specs.BoundedArray:
         """Peak torque of the next stroke of the left and the right hand, N m."""
-        return specs.BoundedArray((2,), np.float64, 0.0, PEAK, "\t".join(REAR))
+        return specs.BoundedArray((2,), np.float64, np.zeros(2), np.full(2, PEAK), "\t".join(REAR))
 
     def begin(self, physics: Physics) -> None:
         """At rest, hands free, another speed to reach."""

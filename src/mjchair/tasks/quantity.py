@@ -41,7 +41,8 @@ class Quantity:
 
     def spec(self) -> specs.BoundedArray:
         """Shape, type and bounds."""
-        return specs.BoundedArray(self.shape, np.float64, self.low, self.high, name=self.name)
+        low, high = (np.broadcast_to(b, self.shape).astype(float) for b in (self.low, self.high))
+        return specs.BoundedArray(self.shape, np.float64, low, high, name=self.name)
 
     def value(self, physics: Physics) -> Array:
         """The reading, within its bounds; memory of its own."""

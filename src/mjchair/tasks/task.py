@@ -44,7 +44,8 @@ class ChairTask(base.Task):  # type: ignore[misc]
 
     def action_spec(self, physics: Physics) -> specs.BoundedArray:
         """Torques about the axles of the left and the right wheel, N m, positive forward."""
-        return specs.BoundedArray((2,), np.float64, -self.torque, self.torque, "\t".join(REAR))
+        most = np.full(2, self.torque)
+        return specs.BoundedArray((2,), np.float64, -most, most, "\t".join(REAR))
 
     def observation_spec(self, physics: Physics) -> OrderedDict[str, specs.BoundedArray]:
         """Shape, type and bounds of every observed quantity."""

@@ -48,7 +48,7 @@ class TightTurn(FollowPath):
     def walls(self, physics: Physics) -> np.ndarray:
         """Distances to the nearest wall along each feeler, m; FAR where there is none nearer."""
         point = np.array([*physics.position(), 0.3])
-        group = np.array([0, 0, 0, 0, 0, 1], dtype=np.uint8)  # the walls' own
+        group = np.array([0, 1, 0, 0, 0, 0], dtype=np.uint8)  # the walls' own
         hit, found = np.zeros(1, dtype=np.int32), []
         for angle in FEELERS:
             turn = physics.heading() + angle
@@ -87,6 +87,6 @@ def spec() -> mujoco.MjSpec:
     arena.add_wall(built, "inner_2", (CORNER - half, half), (CORNER - half, BEYOND))
     for geom in built.geoms:
         if geom.name.startswith("wall_"):
-            geom.group = 5
+            geom.group = 1
     arena.add_marks(built, MARKS)
     return built

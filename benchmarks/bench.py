@@ -1,0 +1,529 @@
+"""Every figure of speed in one run: python benchmarks/bench.py [--only step batch ...] [--out DIR]
+
+What is compared is measured side by side, in turns, in one process: the machine's other work and
+its clock then disturb both alike. A number is the best of the turns, which other work disturbs
+least, and a ratio that of two best ones. docs/benchmarks.md says what each number means. Writes
+benchmarks.md and benchmarks.json into --out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from mujoco import batch
+
+import mjchair
+from mjchair.model.looks import without_looks
+from mjchair.storage import write_whole
+
+STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+TURNS = 41
+STEPS = 300
+
+
+@dataclass
+class Line:
+    """One line of the table."""
+
+    what: str
+    value: str
+    reach: str = ""
+    note: str = ""
+
+
+def rolling(model: mujoco.MjModel, tires: bool = True) -> tuple[mujoco.MjData, np.ndarray]:
+    """Data of the chair under way, and its state."""
+    data = mujoco.MjData(model)
+    with mjchair.installed():
+        if not tires:
+            mjchair.uninstall()
+        data.ctrl[:2] = (1.5, 2.0) if tires else 0.0
+        mujoco.mj_step(model, data, nstep=200)
+    state = np.empty(mujoco.mj_stateSize(model, STATE))
+    mujoco.mj_getState(model, data, state, STATE)
+    return data, state
+
+
+def stepping(
+    model: mujoco.MjModel, compiled: bool | None, steps: int = STEPS
+) -> Callable[[], float]:
+    """A turn: microseconds a step from the same state. compiled: None for no callbacks."""
+    data, state = rolling(model, compiled is not None)
+
+    def turn() -> float:
+        mjchair.uninstall() if compiled is None else mjchair.install(compiled)
+        mujoco.mj_setState(model, data, state, STATE)
+        begin = time.perf_counter()
+        mujoco.mj_step(model, data, nstep=steps)
+        return 1e6 * (time.perf_counter() - begin) / steps
+
+    return turn
+
+
+def side_by_side(
+    turns: dict[str, Callable[[], float]], count: int = TURNS
+) -> dict[str, np.ndarray]:
+    """Every turn, in turns: name -> (count,)."""
+    found: dict[str, list[float]] = {name: [] for name in turns}
+    for turn in turns.values():
+        turn()
+    for _ in range(count):
+        for name, turn in turns.items():
+            found[name].append(turn())
+    mjchair.uninstall()
+    return {name: np.array(values) for name, values in found.items()}
+
+
+def ratio(
+    found: dict[str, np.ndarray], a: str, b: str, best: Callable[..., float] = np.min
+) -> float:
+    """Of the best turns of a and b; best is np.min of times, np.max of rates."""
+    return float(best(found[a]) / best(found[b]))
+
+
+def tireless(spec: mujoco.MjSpec, condim: int) -> mujoco.MjModel:
+    """The same chair without tires: frictionless, or with MuJoCo's own friction.
+
+    Native friction keeps the default solref: on the tires' direct stiffness it blows up.
+    """
+    copy = spec.copy()
+    for kind in (copy.actuators, copy.sensors):
+        for element in list(kind):
+            if element.name.endswith("_tire") or element.name == "heading":
+                copy.delete(element)
+    for geom in copy.geoms:
+        if geom.name.endswith("_tire"):
+            geom.condim, geom.friction = condim, (0.8, 0.005, 0.0001)
+            if condim > 1:
+                geom.solref, geom.solimp = (0.02, 1.0), (0.9, 0.95, 0.001, 0.5, 2.0)
+    return copy.compile()
+
+
+def step_time() -> list[Line]:
+    """The step-time figures of the rolling chair."""
+    spec = mjchair.load_spec()
+    full = spec.compile()
+    found = side_by_side(
+        {
+            "tires": stepping(full, True),
+            "native": stepping(tireless(spec, 3), None),
+            "bare": stepping(tireless(spec, 1), None),
+            "slim": stepping(without_looks(spec).compile(), True),
+        }
+    )
+    plain = side_by_side({"tires": stepping(full, True), "plain": stepping(full, False, 20)}, 7)
+    us = {name: float(values.min()) for name, values in found.items()}
+    return [
+        Line("step of the manual chair, tires on", f"{us['tires']:.2f} us"),
+        Line(
+            "against native elliptic friction, condim 3",
+            f"{ratio(found, 'tires', 'native'):.2f}",
+            "<= 1.0",
+            f"{us['native']:.2f} us",
+        ),
+        Line(
+            "against the bare frictionless chair",
+            f"{ratio(found, 'tires', 'bare'):.2f}",
+            "<= 1.4",
+            f"{us['bare']:.2f} us",
+        ),
+        Line(
+            "plain Python callbacks against compiled",
+            f"{ratio(plain, 'plain', 'tires'):.0f}",
+            ">= 50",
+            f"{plain['plain'].min():.0f} us",
+        ),
+        Line("step without what is only seen", f"{us['slim']:.2f} us"),
+    ]
+
+
+def first_step() -> list[Line]:
+    """A whole process, from command to the first step, compiled code cached."""
+    code = (
+        "import mujoco, mjchair; m = mjchair.load_spec().compile(); mjchair.install(); "
+        "mujoco.mj_step(m, mujoco.MjData(m))"
+    )
+    taken = []
+    for _ in range(4):
+        begin = time.perf_counter()
+        subprocess.run([sys.executable, "-c", code], check=True)
+        taken.append(time.perf_counter() - begin)
+    second = min(taken[1:])
+    return [Line("command to first step, second start", f"{second:.2f} s", "<= 2 s")]
+
+
+def batches() -> list[Line]:
+    """Throughput of mujoco.batch on one and two threads."""
+    model = without_looks(mjchair.load_spec()).compile()
+    _, state = rolling(model)
+    chairs, steps = 64, 200
+
+    def turn(threads: int) -> Callable[[], float]:
+        many = batch.Batch(model, chairs, threads)
+
+        def run() -> float:
+            mjchair.install()
+            many.state[:] = state
+            begin = time.perf_counter()
+            many.step(nstep=steps)
+            return chairs * steps / (time.perf_counter() - begin)
+
+        return run
+
+    found = side_by_side({"one": turn(1), "two": turn(2)})
+    return [
+        Line("chair steps a second, batch, one thread", f"{found['one'].max():,.0f}"),
+        Line("chair steps a second, batch, two threads", f"{found['two'].max():,.0f}"),
+        Line("two threads against one", f"{ratio(found, 'two', 'one', np.max):.2f}", ">= 1.85"),
+    ]
+
+
+def environments() -> list[Line]:
+    """dm_control steps a second, with and without the tires."""
+    from mjchair import tasks
+
+    def turn(tires: bool) -> Callable[[], float]:
+        environment = tasks.load("straight_line", {"random": 0}, looks=False)
+        action, steps = np.array([1.0, 1.2]), 60
+
+        def run() -> float:
+            mjchair.install() if tires else mjchair.uninstall()
+            environment.reset()
+            begin = time.perf_counter()
+            for _ in range(steps):
+                environment.step(action)
+            return steps / (time.perf_counter() - begin)
+
+        return run
+
+    found = side_by_side({"with": turn(True), "without": turn(False)}, 15)
+    return [
+        Line("dm_control steps a second (10 substeps), tires on", f"{found['with'].max():,.0f}"),
+        Line(
+            "the same without tires",
+            f"{found['without'].max():,.0f}",
+            "",
+            f"ratio {ratio(found, 'with', 'without', np.max):.2f}",
+        ),
+    ]
+
+
+def rendering() -> list[Line]:
+    """Pictures a second of mjchair's film against MuJoCo's bare renderer, same size."""
+    from mjchair.report import gl
+    from mjchair.report.render import Film
+
+    width, height, pictures = 640, 360, 8
+    recording = mjchair.simulate(
+        mjchair.load_spec(),
+        mjchair.constant({"left_wheel": 3.0, "right_wheel": 3.5}, 1.0),
+        sample_rate=50.0,
+    )
+
+    def bare() -> float:
+        model = recording.model.load()
+        model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+        data, context = mujoco.MjData(model), gl.context(width, height)
+        scene, drawing = mujoco.MjvScene(model, 2000), mujoco.MjrContext(model, 150)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, drawing)
+        camera, options = mujoco.MjvCamera(), mujoco.MjvOption()
+        camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        camera.fixedcamid = model.camera("follow").id
+        rect, pixels = mujoco.MjrRect(0, 0, width, height), np.empty((height, width, 3), np.uint8)
+
+        def picture(sample: int) -> None:
+            data.qpos[:] = recording.qpos[sample]
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            mujoco.mj_camlight(model, data)
+            every = mujoco.mjtCatBit.mjCAT_ALL
+            mujoco.mjv_updateScene(model, data, options, None, camera, every, scene)
+            mujoco.mjr_render(rect, scene, drawing)
+            mujoco.mjr_readPixels(pixels, None, rect, drawing)
+
+        rate = per_second(picture, pictures)
+        drawing.free()
+        context.free()
+        return rate
+
+    def film() -> float:
+        with Film(recording, width, height) as drawn:
+            return per_second(drawn.frame, pictures)
+
+    try:
+        found = side_by_side({"film": film, "bare": bare}, 5)
+    except mjchair.MjchairError as error:
+        return [Line("pictures a second", "not measured", "", str(error))]
+    return [
+        Line(
+            f"pictures a second, force arrows, {width} x {height}",
+            f"{found['film'].max():.1f}",
+        ),
+        Line(
+            "MuJoCo's bare renderer, same size",
+            f"{found['bare'].max():.1f}",
+            "",
+            f"ratio {ratio(found, 'film', 'bare', np.max):.2f}",
+        ),
+    ]
+
+
+def per_second(picture: Callable[[int], object], count: int) -> float:
+    """How often a second `picture` draws; the first call is not counted."""
+    picture(0)
+    begin = time.perf_counter()
+    for sample in range(1, count + 1):
+        picture(sample)
+    return count / (time.perf_counter() - begin)
+
+
+def sweeps() -> list[Line]:
+    """A sweep against bare mujoco.batch on the same models, states and controls."""
+    from mjchair import sweep
+    from mjchair.sweep import chunk
+
+    study = sweep.Study(
+        axes={"axle_position": [0.0, 0.05], "seed": list(range(16))},
+        fixed={"push_left": 8.0, "push_right": 8.0, "push_spread": 0.1},
+        duration=10.0,
+    )
+    cases = study.cases()
+    first = chunk.run_chunk(study, cases, threads=1)
+    models = [chunk._chair(chunk.key(case)) for case in cases]
+    states = [chunk._start(chunk.key(case), "{}") for case in cases]
+    steps = round(study.duration / models[0].opt.timestep)
+    clock = models[0].opt.timestep * np.arange(steps)
+    control = np.stack(
+        [study.drive(c).control_array(m, clock) for c, m in zip(cases, models, strict=True)]
+    )
+
+    def bare() -> float:
+        mjchair.install()
+        begin = time.process_time()
+        many = batch.Batch(models[0], len(cases), 1)
+        many.set_models(models)
+        many.state[:] = states
+        many.rollout(steps, control, record=("sensordata",))
+        return time.process_time() - begin
+
+    def swept() -> float:
+        with tempfile.TemporaryDirectory() as folder:
+            begin = time.process_time()
+            sweep.run(study, Path(folder) / "out", threads=1)
+            return time.process_time() - begin
+
+    found = side_by_side({"bare": bare, "swept": swept}, 5)
+
+    def built() -> float:
+        chunk._chair.cache_clear()
+        chunk._start.cache_clear()
+        begin = time.process_time()
+        mjchair.install()
+        for case in (cases[0], cases[-1]):
+            chunk._start(chunk.key(case), "{}")
+        return 1e3 * (time.process_time() - begin) / 2
+
+    lines = [
+        Line(
+            "sweep against bare mujoco.batch, 10 s a chair",
+            f"{100 * (ratio(found, 'swept', 'bare') - 1):+.1f} %",
+            "<= 5 %",
+            f"{1e3 * found['bare'].min() / len(cases):.0f} ms of processor a simulation",
+        ),
+        Line("compile and settle another chair, once for all its seeds", f"{built():.0f} ms"),
+    ]
+    return lines + dask(study, first)
+
+
+def dask(study: object, first: list) -> list[Line]:
+    """The same sweep on a Dask worker of one process."""
+    try:
+        from dask.distributed import Client, LocalCluster
+    except ImportError:
+        return [Line("Dask worker against here", "not measured", "", "mjchair[dask] is missing")]
+    from mjchair import sweep
+    from mjchair.sweep.chunk import run_chunk
+
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    with (
+        LocalCluster(
+            n_workers=1,
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address=None,
+            silence_logs=50,
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        client.submit(run_chunk, study, study.cases()[:16:15], pure=False).result()  # type: ignore[attr-defined]
+
+        def far() -> float:
+            with tempfile.TemporaryDirectory() as folder:
+                begin = time.perf_counter()
+                table = sweep.run(
+                    study,  # type: ignore[arg-type]
+                    Path(folder) / "out",
+                    scheduler=cluster.scheduler_address,
+                )
+                taken = time.perf_counter() - begin
+            assert table.to_pylist() == first, "a Dask worker's results differ"
+            return taken
+
+        def here() -> float:
+            with tempfile.TemporaryDirectory() as folder:
+                begin = time.perf_counter()
+                sweep.run(study, Path(folder) / "out", threads=1)  # type: ignore[arg-type]
+                return time.perf_counter() - begin
+
+        found = side_by_side({"far": far, "here": here}, 3)
+    return [
+        Line(
+            "one Dask worker against here, same results to the bit",
+            f"{100 * (ratio(found, 'far', 'here') - 1):+.1f} %",
+        )
+    ]
+
+
+def crowd(count: int) -> mujoco.MjModel:
+    """A scene of several chairs, 3 m apart."""
+    chair = without_looks(mjchair.load_spec())
+    parent = mujoco.MjSpec()
+    parent.nuser_sensor, parent.visual.map.zfar = 2, chair.visual.map.zfar
+    for name in ("timestep", "integrator", "cone", "tolerance"):
+        setattr(parent.option, name, getattr(chair.option, name))
+    floor = next(g for g in chair.geoms if g.name == "floor")
+    parent.worldbody.add_geom(name="floor", type=floor.type, size=floor.size, condim=3)
+    for k in range(count):
+        one = without_looks(mjchair.load_spec())
+        one.delete(one.geom("floor"))
+        frame = parent.worldbody.add_frame(pos=(3.0 * (k % 4), 3.0 * (k // 4), 0.0))
+        parent.attach(one, prefix=f"chair_{k}/", frame=frame)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return parent.compile()
+
+
+def crowds() -> list[Line]:
+    """Cost of a step against the number of chairs in one scene."""
+    counts = (1, 4, 16)
+    found = side_by_side(
+        {str(n): stepping(crowd(n), True, max(20, STEPS // n)) for n in counts}, 15
+    )
+    lines = []
+    for n in counts:
+        each = found[str(n)].min() / n
+        lines.append(
+            Line(
+                f"step a chair, {n} in one scene",
+                f"{each:.2f} us",
+                "" if n == 1 else "linear within 10 %",
+                "" if n == 1 else f"{ratio(found, str(n), '1') / n:.2f} of one alone",
+            )
+        )
+    return lines
+
+
+def fields() -> list[Line]:
+    """Cost of a step on a height field against its contacts."""
+    turns, contacts = {}, {}
+    models = {"plane": without_looks(mjchair.load_spec()).compile()}
+    for cell in (0.2, 0.05, 0.025):
+        shape = (round(5 / cell) + 1, round(10 / cell) + 1)
+        spec = mjchair.load_spec(scene="hfield", heights=np.zeros(shape))
+        models[f"{100 * cell:g} cm cells"] = without_looks(spec).compile()
+    for name, model in models.items():
+        data, _ = rolling(model)
+        contacts[name] = data.ncon
+        turns[name] = stepping(model, True, 60)
+        bare = f"{name}, no callbacks"
+        turns[bare] = stepping(model, None, 60)
+    found = side_by_side(turns, 9)
+    lines = []
+    for name in models:
+        tires = found[name].min() - found[f"{name}, no callbacks"].min()
+        lines.append(
+            Line(
+                f"step on {'a plane' if name == 'plane' else 'a height field, ' + name}",
+                f"{found[name].min():.1f} us",
+                "",
+                f"{contacts[name]} contacts; tires {tires:.1f} us of it",
+            )
+        )
+    return lines
+
+
+PARTS: dict[str, Callable[[], list[Line]]] = {
+    "step": step_time,
+    "start": first_step,
+    "batch": batches,
+    "tasks": environments,
+    "render": rendering,
+    "sweep": sweeps,
+    "crowd": crowds,
+    "hfield": fields,
+}
+
+
+def machine() -> dict[str, str]:
+    """What it ran on."""
+    name = platform.processor() or platform.machine()
+    if Path("/proc/cpuinfo").is_file():
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                name = line.split(":", 1)[1].strip()
+                break
+    from importlib.metadata import version
+
+    versions = {p: version(p) for p in ("mujoco", "dm-control", "numpy", "numba")}
+    load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "?"
+    return {
+        "processor": f"{name}, {os.cpu_count()} threads",
+        "load at the start": load,
+        "python": platform.python_version(),
+        **versions,
+    }
+
+
+def markdown(told: dict[str, str], lines: list[Line]) -> str:
+    rows = ["| figure | measured | reach | |", "|---|---|---|---|"]
+    rows += [f"| {line.what} | {line.value} | {line.reach} | {line.note} |" for line in lines]
+    about = "; ".join(f"{key} {value}" for key, value in told.items())
+    return f"{about}\n\n" + "\n".join(rows) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("out/bench"))
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS))
+    args = parser.parse_args()
+    told, lines = machine(), []
+    logging.getLogger("absl").setLevel(logging.ERROR)  # dm_control's echo of MuJoCo's warnings
+    width = shutil.get_terminal_size((100, 24)).columns
+    for name in args.only:
+        for line in PARTS[name]():
+            lines.append(line)
+            print(f"{line.what:58} {line.value:>14}  {line.reach:12} {line.note}"[:width])
+    args.out.mkdir(parents=True, exist_ok=True)
+    write_whole(args.out / "benchmarks.md", markdown(told, lines))
+    table = {"machine": told, "figures": [asdict(line) for line in lines]}
+    write_whole(args.out / "benchmarks.json", json.dumps(table, indent=1) + "\n")
+    print(f"written to {args.out}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,267 @@
+"""The tasks: conformance, the suite's own checks, determinism, and baselines that solve them."""
+
+import numpy as np
+import pytest
+from absl.testing import absltest
+from dm_env import test_utils
+
+import mjchair
+from mjchair import tasks  # chooses the OpenGL that dm_control takes
+
+FLAT = "observations"  # what dm_control calls them where they are flat
+
+NAMES = tuple(tasks.TASKS)
+LIGHT = {"looks": False}
+
+
+def load(name, seed=0, **options):
+    return tasks.load(name, {"random": seed}, **{**LIGHT, **options})
+
+
+def random_actions(environment, count, seed=1):
+    spec = environment.action_spec()
+    random = np.random.RandomState(seed)
+    return [random.uniform(spec.minimum, spec.maximum) for _ in range(count)]
+
+
+def play(environment, actions):
+    """Time steps of an episode or more, a reset first."""
+    return [environment.reset(), *(environment.step(action) for action in actions)]
+
+
+# dm_env's own conformance checks, once a task
+for _name in NAMES:
+
+    class _Conformance(test_utils.EnvironmentTestMixin, absltest.TestCase):
+        task = _name
+
+        def make_object_under_test(self):
+            return load(self.task, environment_kwargs={"time_limit": 0.3})
+
+        def make_action_sequence(self):
+            yield from random_actions(self.environment, 40)
+
+    _Conformance.__name__ = _Conformance.__qualname__ = f"Test_{_name}"
+    globals()[_Conformance.__name__] = _Conformance
+del _Conformance
+
+
+@pytest.fixture(params=NAMES)
+def name(request):
+    return request.param
+
+
+def test_observations_and_rewards_keep_their_bounds(name):
+    environment = load(name)
+    spec, action_spec = environment.observation_spec(), environment.action_spec()
+    assert action_spec.shape == (2,) and np.isfinite(action_spec.minimum).all()
+    assert environment.physics.model.nu > 2, "the tires' own controls stay out of the action"
+    for step in play(environment, random_actions(environment, 300)):
+        assert set(step.observation) == set(spec)
+        for key, value in step.observation.items():
+            spec[key].validate(value)
+            assert np.isfinite(spec[key].minimum).all() and np.isfinite(spec[key].maximum).all()
+        if step.first():
+            assert step.reward is None and step.discount is None
+        else:
+            assert isinstance(step.reward, float) and 0.0 <= step.reward <= 1.0
+            assert isinstance(step.discount, float) and 0.0 <= step.discount <= 1.0
+
+
+def test_every_element_is_named_and_there_are_cameras(name):
+    model = tasks.load(name).physics.model
+    kinds = {
+        "body": "nbody",
+        "joint": "njnt",
+        "geom": "ngeom",
+        "site": "nsite",
+        "camera": "ncam",
+        "light": "nlight",
+        "mesh": "nmesh",
+        "texture": "ntex",
+        "material": "nmat",
+        "equality": "neq",
+        "actuator": "nu",
+        "sensor": "nsensor",
+    }
+    for kind, size in kinds.items():
+        assert all(model.id2name(i, kind) for i in range(getattr(model, size))), kind
+    assert model.ncam >= 2
+
+
+def test_same_seed_same_episode_to_the_bit(name):
+    runs = []
+    for _ in range(2):
+        environment = load(name, seed=7)
+        steps = play(environment, random_actions(environment, 150))
+        runs.append((steps, environment.physics.get_state()))
+    for one, other in zip(runs[0][0], runs[1][0], strict=True):
+        assert (one.step_type, one.reward, one.discount) == (
+            other.step_type,
+            other.reward,
+            other.discount,
+        )
+        for key in one.observation:
+            assert np.array_equal(one.observation[key], other.observation[key]), key
+    assert np.array_equal(runs[0][1], runs[1][1])
+
+
+def test_another_seed_and_another_episode_differ(name):
+    environment = load(name, seed=42)
+    first, second = environment.reset().observation, environment.reset().observation
+    other = load(name, seed=43).reset().observation
+    assert any((first[key] != second[key]).any() for key in first)
+    assert any((first[key] != other[key]).any() for key in first)
+
+
+def test_looks_change_no_observation(name):
+    runs = []
+    for looks in (True, False):
+        environment = tasks.load(name, {"random": 3}, looks=looks)
+        runs.append(play(environment, random_actions(environment, 60))[-1].observation)
+    for key in runs[0]:
+        assert np.array_equal(runs[0][key], runs[1][key]), key
+
+
+def test_observations_share_no_memory(name):
+    environment = load(name)
+    steps = play(environment, random_actions(environment, 1))
+    for key, value in steps[0].observation.items():
+        assert not np.may_share_memory(value, steps[1].observation[key])
+
+
+def test_no_observation_is_constant(name):
+    environment = load(name)
+    actions = [a for k in range(40) for a in random_actions(environment, 1, k) * 12]
+    seen = [step.observation for _ in range(2) for step in play(environment, actions)]
+    for key in seen[0]:
+        values = np.array([observation[key] for observation in seen])
+        if (name, key) in {("tight_turn", "walls"), ("slalom", "side")}:
+            values = values[:, :1]  # no wall within reach of some feelers; no post passed
+        if (name, key) != ("slalom", "side"):
+            assert (values != values[0]).any(axis=0).all(), key
+
+
+def test_flat_observations(name):
+    environment = load(name, environment_kwargs={"flat_observation": True})
+    spec = environment.observation_spec()
+    assert set(spec) == {FLAT}
+    step = play(environment, random_actions(environment, 3))[-1]
+    spec[FLAT].validate(step.observation[FLAT])
+
+
+def test_the_baseline_solves_it(name):
+    environment = load(name, seed=11)
+    spec = environment.action_spec()
+    for _ in range(2):
+        controller, step, rewards = tasks.baseline(name), environment.reset(), []
+        while not step.last():
+            action = np.clip(controller(step.observation), spec.minimum, spec.maximum)
+            step = environment.step(action)
+            rewards.append(step.reward)
+        assert environment.task.solved(environment.physics)
+        assert np.mean(rewards) > 0.7 and step.discount == 1.0
+
+
+def test_random_torques_do_not_solve_it(name):
+    environment = load(name)
+    for action in [environment.reset(), *random_actions(environment, 500)][1:]:
+        if environment.step(action).last():
+            break
+    assert not environment.task.solved(environment.physics)
+
+
+def test_gymnasium_takes_it(name):
+    pytest.importorskip("gymnasium", reason="the extra [tasks] is not installed")
+    shimmy = pytest.importorskip("shimmy", reason="the extra [tasks] is not installed")
+    from gymnasium.utils.env_checker import check_env
+
+    check_env(shimmy.DmControlCompatibilityV0(load(name)), skip_render_check=True)
+
+
+def test_observations_are_described(name):
+    told = tasks.describe(name).splitlines()
+    environment = load(name)
+    assert [line.split()[0] for line in told] == list(environment.observation_spec())
+    assert all(": " in line and "[" in line for line in told)
+
+
+def test_tires_are_on():
+    """Full torque to one side turns the chair; without tire forces nothing would."""
+    environment = load("straight_line")
+    environment.reset()
+    for _ in range(40):
+        environment.step(np.array([-15.0, 15.0]))
+    assert environment.physics.yaw_rate() > 1.0
+    mjchair.uninstall()
+    environment.reset()
+    for _ in range(40):
+        environment.step(np.array([-15.0, 15.0]))
+    assert abs(environment.physics.yaw_rate()) < 0.1
+
+
+def test_touching_a_post_ends_the_episode():
+    environment = load("slalom")
+    step = environment.reset()
+    for _ in range(400):
+        step = environment.step(np.array([4.0, 4.0]))
+        if step.last():
+            break
+    assert step.last() and step.discount == 0.0 and step.reward == 0.0
+    assert environment.physics.touches()
+
+
+def test_hands_rest_between_strokes():
+    environment = load("push")
+    environment.reset()
+    torques = []
+    for _ in range(100):
+        environment.step(np.array([20.0, 0.0]))
+        torques.append(environment.physics.data.ctrl[:2].copy())
+    torques = np.array(torques)
+    on = torques[:, 0] > 0.0
+    strokes = np.flatnonzero(np.diff(on.astype(int)) == 1)
+    assert np.diff(strokes) * 0.02 == pytest.approx(0.96, abs=0.021)
+    assert 19.0 < torques[:, 0].max() <= 20.0 and not torques[:, 1].any()
+
+
+def test_a_controller_that_knows_the_lateral_force_is_better():
+    environment = load("follow_path", scene_kwargs={"grade": 0.06})
+    spec, errors = environment.action_spec(), {}
+    for lateral in (False, True):
+        offsets = []
+        for seed in range(3):
+            environment.task.random.seed(seed)
+            controller, step = tasks.baseline("follow_path", lateral=lateral), environment.reset()
+            while not step.last():
+                step = environment.step(
+                    np.clip(controller(step.observation), spec.minimum, spec.maximum)
+                )
+                offsets.append(step.observation["offset"][0])
+        errors[lateral] = np.sqrt(np.mean(np.square(offsets)))
+    assert errors[True] < 0.6 * errors[False]
+
+
+def test_pixels_on_request():
+    environment = tasks.load(
+        "straight_line", {"random": 0}, pixels={"height": 48, "width": 64, "camera_id": "follow"}
+    )
+    picture = environment.reset().observation["pixels"]
+    assert picture.shape == (48, 64, 3) and picture.std() > 5.0
+    with pytest.raises(mjchair.MjchairError, match="need looks"):
+        tasks.load("straight_line", looks=False, pixels=True)
+
+
+def test_an_unknown_task_is_named():
+    with pytest.raises(mjchair.MjchairError, match="did you mean 'slalom'"):
+        tasks.load("slalon")
+
+
+def test_a_path_of_ones_own():
+    path = [(0, 0), (1, 0), (2, 0.3), (3, 0.3), (4, 0.0)]
+    environment = tasks.load("follow_path", {"random": 0, "path": path}, looks=False)
+    environment.reset()
+    assert environment.task.course.length == pytest.approx(4.1, abs=0.1)
+    assert environment.task.course.at(1.0)[0] == pytest.approx((1.0, 0.0), abs=0.03)
+    with pytest.raises(mjchair.MjchairError, match="a path has shape"):
+        tasks.load("follow_path", {"path": [(0, 0), (1, 0)]}, looks=False)
