@@ -46,9 +46,7 @@ def _where(diagnosis: Diagnosis) -> Figure:
     systems = [("before", base.system)] + ([("after", fitted.system)] if fitted else [])
     figure = Figure(figsize=(9, 0.28 * len(shooter.channels) + 1.6))
     axes = figure.subplots(1, len(systems), sharey=True, squeeze=False)[0]
-    labels = [
-        f"{shooter.study.runs[w.run].trial.name} {w.first:.0f} s" for w in shooter.windows
-    ]
+    labels = [f"{shooter.study.runs[w.run].trial.name} {w.first:.0f} s" for w in shooter.windows]
     for ax, (name, system) in zip(axes, systems, strict=True):
         ratio = np.array([c.chi2 / np.maximum(c.dof, 1.0) for c in system.cells]).T
         image = ax.imshow(np.sqrt(ratio), aspect="auto", cmap="magma_r", vmin=0.5, vmax=4.0)
@@ -74,9 +72,7 @@ def _force(diagnosis: Diagnosis) -> Figure:
                 d = known[found.pulses[k].window]
                 at = min(int(np.searchsorted(d["time"], found.pulses[k].time)), len(d["time"]) - 1)
                 x.append(d[driver][at])
-            ax.errorbar(
-                x, found.value[mine], found.std[mine], fmt=".", ms=3, lw=0.4, color="#36c"
-            )
+            ax.errorbar(x, found.value[mine], found.std[mine], fmt=".", ms=3, lw=0.4, color="#36c")
             ax.axhline(0.0, color="#999", lw=0.6)
             ax.set_xlabel(f"{driver} ({unit})")
             ax.set_ylabel(f"missing {name} ({'N' if name == 'Fx' else 'N m'})")
@@ -175,7 +171,15 @@ def page(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> str:
         _image(drawn, "candidates"),
         _table(
             found["candidates"][:14],
-            ("name", "channel", "held_out_gain", "closure", "detectability", "p_value", "collinear"),
+            (
+                "name",
+                "channel",
+                "held_out_gain",
+                "closure",
+                "detectability",
+                "p_value",
+                "collinear",
+            ),
         ),
         "<h2>4. The corrected model beside the old one</h2>",
         _image(drawn, "runs"),
