@@ -46,9 +46,7 @@ def _where(diagnosis: Diagnosis) -> Figure:
     systems = [("before", base.system)] + ([("after", fitted.system)] if fitted else [])
     figure = Figure(figsize=(9, 0.28 * len(shooter.channels) + 1.6))
     axes = figure.subplots(1, len(systems), sharey=True, squeeze=False)[0]
-    labels = [
-        f"{shooter.study.runs[w.run].trial.name} {w.first:.0f} s" for w in shooter.windows
-    ]
+    labels = [f"{shooter.study.runs[w.run].trial.name} {w.first:.0f} s" for w in shooter.windows]
     for ax, (name, system) in zip(axes, systems, strict=True):
         ratio = np.array([c.chi2 / np.maximum(c.dof, 1.0) for c in system.cells]).T
         image = ax.imshow(np.sqrt(ratio), aspect="auto", cmap="magma_r", vmin=0.5, vmax=4.0)
@@ -74,9 +72,7 @@ def _force(diagnosis: Diagnosis) -> Figure:
                 d = known[found.pulses[k].window]
                 at = min(int(np.searchsorted(d["time"], found.pulses[k].time)), len(d["time"]) - 1)
                 x.append(d[driver][at])
-            ax.errorbar(
-                x, found.value[mine], found.std[mine], fmt=".", ms=3, lw=0.4, color="#36c"
-            )
+            ax.errorbar(x, found.value[mine], found.std[mine], fmt=".", ms=3, lw=0.4, color="#36c")
             ax.axhline(0.0, color="#999", lw=0.6)
             ax.set_xlabel(f"{driver} ({unit})")
             ax.set_ylabel(f"missing {name} ({'N' if name == 'Fx' else 'N m'})")
@@ -142,6 +138,16 @@ def _smooth(values: Any) -> Any:
     return np.convolve(edge, np.ones(width) / width, mode="valid")[: filled.size]
 
 
+DECIDED = "These data decide; nothing is needed."
+COLUMNS = (
+    "name",
+    "channel",
+    "held_out_gain",
+    "closure",
+    "detectability",
+    "p_value",
+    "collinear",
+)
 WORDS = {
     "none": "The model explains these runs: nothing beyond the noise is left.",
     "named": "One explanation stands.",
@@ -159,10 +165,11 @@ def page(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> str:
         f"<style>{STYLE}</style><h1>Diagnosis: {html.escape(found['verdict'])}</h1>",
         f"<p class=verdict>{WORDS[found['verdict']]}{_effects(found)}</p>",
         "<h2>1. Where model and measurement disagree</h2>",
-        f"<p>Each window of about 2 s starts from its own fitted state, so only forces show. Rms of "
-        f"the whitened residual: <b>{gap['before']:.2f}</b> before, <b>{gap['after']:.2f}</b> after, "
-        f"noise floor {gap['noise_floor']:.2f} ({html.escape(gap['scope'])}). The chance of such "
-        f"tests without any gap: {gap['p_value']:.2g} before, {gap['p_value_after']:.2g} after.</p>",
+        "<p>Each window of about 2 s starts from its own fitted state, so only forces show. Rms "
+        f"of the whitened residual: <b>{gap['before']:.2f}</b> before, "
+        f"<b>{gap['after']:.2f}</b> after, noise floor {gap['noise_floor']:.2f} "
+        f"({html.escape(gap['scope'])}). The chance of such tests without any gap: "
+        f"{gap['p_value']:.2g} before, {gap['p_value_after']:.2g} after.</p>",
         _image(drawn, "where"),
         _table(found["where"], ("trial", "channel", "window", "regime", "statistic")),
         "<h2>2. What force would close the gap, and what it goes with</h2>",
@@ -175,12 +182,20 @@ def page(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> str:
         _image(drawn, "candidates"),
         _table(
             found["candidates"][:14],
-            ("name", "channel", "held_out_gain", "closure", "detectability", "p_value", "collinear"),
+            (
+                "name",
+                "channel",
+                "held_out_gain",
+                "closure",
+                "detectability",
+                "p_value",
+                "collinear",
+            ),
         ),
         "<h2>4. The corrected model beside the old one</h2>",
         _image(drawn, "runs"),
         "<h2>5. What to do next</h2>",
-        f"<p>{html.escape(found['next_experiment'] or 'These data decide; nothing is needed.')}</p>",
+        f"<p>{html.escape(found['next_experiment'] or DECIDED)}</p>",
         "<h2>Notes</h2><ul>",
         *(f"<li>{html.escape(note)}</li>" for note in found["notes"]),
         "</ul></html>",
