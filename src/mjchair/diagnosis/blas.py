@@ -22,7 +22,7 @@ def _controls() -> list[tuple[Any, Any]]:
         for path in (folder.parent / f"{package.__name__}.libs").glob("*openblas*"):
             library = ctypes.CDLL(str(path))
             for prefix in PREFIXES:
-                for suffix in ("64_", "_", ""):
+                for suffix in ("64_", ""):  # the ones that end in "_" alone are Fortran's
                     get = getattr(library, f"{prefix}_get_num_threads{suffix}", None)
                     put = getattr(library, f"{prefix}_set_num_threads{suffix}", None)
                     if get is not None and put is not None:

@@ -210,17 +210,17 @@ def compared(diagnosis: Diagnosis) -> Figure:
     whole = Shooter(shooter.study, [_whole(shooter, i) for i in chosen])
     plain = Fit(base.fit.nuisances)
     old = _rolled(whole, shooter, plain, base.track)
-    new = None
+    new: list[Array | None] = [None] * len(chosen)
     if fitted is not None:
         fit = Fit(base.fit.nuisances, {}, fitted.fit.terms)
-        new = _rolled(whole, shooter, fit, fitted.track)
+        new = [*_rolled(whole, shooter, fit, fitted.track)]
     figure = Figure(figsize=(9.4, 2.3 * len(chosen) + 0.6), layout="constrained")
     axes = figure.subplots(len(chosen), 2, squeeze=False)
     units = {c.name: c.unit for c in channels(shooter.base)}
     noise = np.array([base.bench.noise[c].total for c in whole.channels])
     for row, (k, w) in zip(axes, enumerate(whole.windows), strict=True):
-        for ax, channel in zip(row, _telling(whole, w, old[k], new and new[k], noise), strict=True):
-            _one_run(ax, whole, w, channel, old[k], new and new[k])
+        for ax, channel in zip(row, _telling(whole, w, old[k], new[k], noise), strict=True):
+            _one_run(ax, whole, w, channel, old[k], new[k])
             name = whole.channels[channel]
             ax.set_ylabel(f"{name} ({units.get(name, 'SI')})", fontsize=8.5)
     for ax in axes[-1]:
@@ -260,7 +260,7 @@ def _telling(
     """The two channels with the largest difference, against noise."""
     against = shooter.measured(window) if new is None else new
     miss = residual(against, old, shooter.channels) / noise
-    there = ~np.isnan(shooter.measured(window)).all(axis=0)
+    there = np.isfinite(shooter.measured(window)).any(axis=0).tolist()
     size = np.array(
         [float(np.nanmean(m**2)) if ok else -1.0 for m, ok in zip(miss.T, there, strict=True)]
     )
