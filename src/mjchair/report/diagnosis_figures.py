@@ -260,7 +260,7 @@ def _telling(
     """The two channels with the largest difference, against noise."""
     against = shooter.measured(window) if new is None else new
     miss = residual(against, old, shooter.channels) / noise
-    there = np.isfinite(shooter.measured(window)).any(axis=0).tolist()
+    there = [bool(np.isfinite(column).any()) for column in shooter.measured(window).T]
     size = np.array(
         [float(np.nanmean(m**2)) if ok else -1.0 for m, ok in zip(miss.T, there, strict=True)]
     )

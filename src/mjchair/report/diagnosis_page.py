@@ -318,7 +318,7 @@ def _assumed(diagnosis: Diagnosis) -> list[str]:
         "</ul>",
         "<p>What is only roughly known, and how far the fit moved it:</p>",
         _table(
-            ("quantity", "!prior standard deviation (SI or relative)", "!moved by (prior sd)"),
+            ("quantity", "!prior sd", "unit", "!moved by (prior sd)"),
             moved,
         ),
     ]
