@@ -68,7 +68,9 @@ def case(number: int, seed: int) -> Case:
         return Case("none")
     if place in (5, 15):
         which = OUTSIDE[(2 * turn + (place == 15)) % len(OUTSIDE)]
-        return Case("outside", {which: parameters(which, rng)}, float(rng.choice([15.0, 30.0, 50.0])))
+        return Case(
+            "outside", {which: parameters(which, rng)}, float(rng.choice([15.0, 30.0, 50.0]))
+        )
     if place in (4, 11, 18):
         first, second = rng.choice(len(EFFECTS) - 3, 2, replace=False)
         names = (EFFECTS[first], EFFECTS[second])

@@ -256,9 +256,9 @@ class World:
                 continue
             load = 300.0 if "caster" not in w else 140.0
             spin = np.tanh(d.qvel[self.dof[w]] / 0.03)
-            d.qfrc_applied[self.dof[w]] -= p["coefficient"] * load * self.m.geom_size[
-                self.tire[w], 0
-            ] * spin
+            d.qfrc_applied[self.dof[w]] -= (
+                p["coefficient"] * load * self.m.geom_size[self.tire[w], 0] * spin
+            )
 
     # outside the library
     def _force_bent_rim(self, d, p, r, v, speed, yaw, driven, total):
@@ -379,8 +379,9 @@ def _write(path: Path, table: dict[str, np.ndarray]) -> None:
 
 def seal(path: Path, case: Case) -> None:
     """Hide the answer from a casual look."""
-    text = json.dumps({"kind": case.kind, "hidden": case.hidden, "sigma": case.sigma,
-                       "channel": case.channel})
+    text = json.dumps(
+        {"kind": case.kind, "hidden": case.hidden, "sigma": case.sigma, "channel": case.channel}
+    )
     path.write_bytes(base64.b64encode(zlib.compress(text.encode())))
 
 
@@ -392,7 +393,12 @@ def unseal(path: Path) -> dict:
 # -- sizes ---------------------------------------------------------------------------------------
 
 LINEAR = {  # channel -> order of the polynomial that a free initial state takes from a window
-    "position": 1, "heading": 1, "angle": 1, "speed": 0, "gyro": 0, "accelerometer": -1,
+    "position": 1,
+    "heading": 1,
+    "angle": 1,
+    "speed": 0,
+    "gyro": 0,
+    "accelerometer": -1,
 }
 
 
@@ -441,12 +447,28 @@ def _fault(case: Case, exact: dict) -> dict:
 
 
 MOST = {  # beyond these the chair is another vehicle
-    "toe": 0.08, "camber": 0.25, "wheel_radius": 0.02, "mass_offset": 0.08, "payload": 40.0,
-    "cornering_stiffness": 0.7, "load_sensitivity": 0.6, "relaxation_length": 0.5,
-    "caster_trail": 0.05, "torque_gain": 0.5, "drive_lag": 0.4, "sensor_scale": 0.5,
-    "sensor_delay": 0.2, "rolling_resistance": 0.05, "floor_slope": 0.06, "wind": 8.0,
-    "air_drag": 4.0, "rider_sway": 0.15, "turning_scrub": 15.0, "caster_friction": 4.0,
-    "surface_patch": 0.2, "back_emf": 2.0,
+    "toe": 0.08,
+    "camber": 0.25,
+    "wheel_radius": 0.02,
+    "mass_offset": 0.08,
+    "payload": 40.0,
+    "cornering_stiffness": 0.7,
+    "load_sensitivity": 0.6,
+    "relaxation_length": 0.5,
+    "caster_trail": 0.05,
+    "torque_gain": 0.5,
+    "drive_lag": 0.4,
+    "sensor_scale": 0.5,
+    "sensor_delay": 0.2,
+    "rolling_resistance": 0.05,
+    "floor_slope": 0.06,
+    "wind": 8.0,
+    "air_drag": 4.0,
+    "rider_sway": 0.15,
+    "turning_scrub": 15.0,
+    "caster_friction": 4.0,
+    "surface_patch": 0.2,
+    "back_emf": 2.0,
 }
 
 

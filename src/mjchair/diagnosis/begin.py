@@ -99,6 +99,23 @@ def _speed_from_acceleration(run: Run) -> float:
     return float(np.clip(lost, 0.0, 5.0)) if still and lost > 0.2 else 1.0
 
 
+def stops(run: Run) -> float | None:
+    """When a run whose speed no channel sees comes to rest, s; None: it is seen, or never rests.
+
+    A coasting chair's accelerometer falls to nothing as it stops.
+    """
+    if observed(run)[3] or "imu_accelerometer.x" not in run.trial.channels:
+        return None
+    time, pull = run.trial.samples("imu_accelerometer.x")
+    width = max(3, round(0.2 / max(float(np.median(np.diff(time))), 1e-4)))
+    smooth = np.convolve(pull, np.ones(width) / width, mode="same")
+    size = float(np.median(np.abs(smooth[: max(3, smooth.size // 3)])))
+    moving = np.flatnonzero(np.abs(smooth) > 0.5 * size)
+    if not moving.size or time[-1] - time[moving[-1]] < 0.7:
+        return None
+    return float(time[moving[-1]])
+
+
 def _yaw_rate(run: Run) -> float:
     gyro = _first(run, "imu_gyro.z")
     if gyro is not None:

@@ -18,7 +18,7 @@ def _controls() -> list[tuple[Any, Any]]:
     """Getter and setter of the number of threads of every OpenBLAS that is loaded."""
     found = []
     for package in (numpy, scipy):
-        folder = Path(package.__file__).parent
+        folder = Path(str(package.__file__)).parent
         for path in (folder.parent / f"{package.__name__}.libs").glob("*openblas*"):
             library = ctypes.CDLL(str(path))
             for prefix in PREFIXES:

@@ -223,7 +223,9 @@ def refit(
         if turn == rounds:
             break
         moved = _moved(fit, system, step)
-        small = np.abs(step[count:]) < 0.02 * np.maximum(_spread(system, bench.windows)[count:], 1e-9)
+        small = np.abs(step[count:]) < 0.02 * np.maximum(
+            _spread(system, bench.windows)[count:], 1e-9
+        )
         if turn and small.all():
             break
         fit = moved
@@ -236,6 +238,7 @@ def refit(
         p = term.effect.parameter(name)
         if term.values[name] in (p.low, p.high) and not p.low == p.neutral == term.values[name]:
             bound.append(key)
+    assert found is not None
     return Fitted(fit, found, columns, system, chi2, std, tuple(bound))
 
 

@@ -87,7 +87,11 @@ SHAPES = {
         d["speed"] * (np.abs(d["speed"]) > np.median(np.abs(d["speed"]))),
         np.tanh(d["speed"] / 0.05) * (np.abs(d["speed"]) > 1.15),
     ],
-    "yaw_rate": lambda d: [np.tanh(d["yaw_rate"] / 0.05), d["yaw_rate"], d["yaw_rate"] * d["speed"]],
+    "yaw_rate": lambda d: [
+        np.tanh(d["yaw_rate"] / 0.05),
+        d["yaw_rate"],
+        d["yaw_rate"] * d["speed"],
+    ],
     "heading": lambda d: [np.cos(d["heading"]), np.sin(d["heading"])],
     "left wheel's turn": lambda d: [np.cos(d["left_angle"]), np.sin(d["left_angle"])],
     "right wheel's turn": lambda d: [np.cos(d["right_angle"]), np.sin(d["right_angle"])],

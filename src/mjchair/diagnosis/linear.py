@@ -241,9 +241,7 @@ class Reduced:
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(unit))) / scale)
 
 
-def reduce(
-    system: System, windows: Sequence[int] | NDArray[np.int64], free: int = 0
-) -> Reduced:
+def reduce(system: System, windows: Sequence[int] | NDArray[np.int64], free: int = 0) -> Reduced:
     """Sum over the windows and eliminate the nuisances (unit prior).
 
     Args:

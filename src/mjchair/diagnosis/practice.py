@@ -118,5 +118,7 @@ def _table(recording: Recording, inputs: Inputs | None, rng: np.random.Generator
         columns |= {n: inputs.at(n, recording.time) for n in inputs.controls}
     writer.writerow(["time", *columns])
     for k, time in enumerate(recording.time):
-        writer.writerow([repr(round(float(v), 7)) for v in (time, *(c[k] for c in columns.values()))])
+        writer.writerow(
+            [repr(round(float(v), 7)) for v in (time, *(c[k] for c in columns.values()))]
+        )
     return out.getvalue()

@@ -102,9 +102,7 @@ def predictions(
 
 def _unwrapped(shooter: Shooter, column: Column) -> Column:
     nothing = [np.zeros_like(c) for c in column]
-    return [
-        residual(c, n, shooter.channels) for c, n in zip(column, nothing, strict=True)
-    ]
+    return [residual(c, n, shooter.channels) for c, n in zip(column, nothing, strict=True)]
 
 
 def half_step(spec: mujoco.MjSpec) -> None:
@@ -117,9 +115,7 @@ def other_integrator(spec: mujoco.MjSpec) -> None:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
 
 
-def sensor_column(
-    shooter: Shooter, track: Track, kind: str, channel: str, size: float
-) -> Column:
+def sensor_column(shooter: Shooter, track: Track, kind: str, channel: str, size: float) -> Column:
     """What a bias (SI), a scale (1) or a delay (s) of one channel changes."""
     which = list(shooter.channels).index(channel)
     out = []
@@ -217,9 +213,7 @@ def pulse_columns(
     return out
 
 
-def _force(
-    shooter: Shooter, chair: Chair, track: Track, pulse: Pulse, step: float
-) -> Array:
+def _force(shooter: Shooter, chair: Chair, track: Track, pulse: Pulse, step: float) -> Array:
     w = shooter.windows[pulse.window]
     steps = int(np.ceil(shooter.steps * shooter.step / step)) + 1
     every = max(1, round(step / shooter.step))
@@ -243,7 +237,9 @@ def _force(
 
 
 def _fit(values: Array, steps: int) -> Array:
-    return values[:steps] if len(values) >= steps else np.pad(values, (0, steps - len(values)), "edge")
+    return (
+        values[:steps] if len(values) >= steps else np.pad(values, (0, steps - len(values)), "edge")
+    )
 
 
 def headings(chair: Chair, qpos: Array) -> tuple[Array, Array]:
@@ -252,5 +248,3 @@ def headings(chair: Chair, qpos: Array) -> tuple[Array, Array]:
     east, north = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)
     size = np.hypot(east, north)
     return east / size, north / size
-
-

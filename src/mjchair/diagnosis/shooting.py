@@ -151,7 +151,7 @@ class Shooter:
             for name in inputs.controls:
                 out[:, names.find(name, known, "actuator")] = inputs.at(name, time)
         if rider_sway.MOTION in known and self.motions[window.run] is not None:
-            place, _ = self.motions[window.run](time)  # type: ignore[misc]
+            place, _ = self.motions[window.run](time)  # type: ignore[misc,arg-type]
             out[:, known.index(rider_sway.MOTION)] = place
         return out
 
@@ -227,7 +227,7 @@ class Shooter:
                 out.qpos[q : q + nq] = job.state.qpos[qb : qb + nq]
                 out.qvel[v : v + nv] = job.state.qvel[vb : vb + nv]
             elif names.same(name, rider_sway.MOTION) and self.motions[job.window.run]:
-                place, speed = self.motions[job.window.run](np.array([job.window.start]))  # type: ignore[misc]
+                place, speed = self.motions[job.window.run](np.array([job.window.start]))  # type: ignore[misc,arg-type]
                 out.qpos[q], out.qvel[v] = place[0], speed[0]
         controls = self.controls(model, job.window, 1)[0]
         known = names.actuators(base)

@@ -48,4 +48,4 @@ class Store:
     def save(self, key: str, arrays: Sequence[Array]) -> None:
         """Keep arrays, whole or not at all."""
         with whole(self.folder / f"{key}.npz") as path:
-            np.savez(path, **{f"w{i}": a for i, a in enumerate(arrays)})
+            np.savez(path, **{f"w{i}": a for i, a in enumerate(arrays)})  # type: ignore[arg-type]

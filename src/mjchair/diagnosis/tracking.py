@@ -167,7 +167,9 @@ def _fit_round(
     each = 2 + len(SLOW)
     for n, i in enumerate(members):
         w = shooter.windows[i]
-        seen = [observer.observe(shooter, w, o.predicted) for o in outcomes[n * each : n * each + each]]
+        seen = [
+            observer.observe(shooter, w, o.predicted) for o in outcomes[n * each : n * each + each]
+        ]
         predicted[i] = seen[0]
         slow[i] = np.stack([s - seen[1] for s in seen[2:]], axis=2)
         miss = residual(shooter.measured(w), seen[0], shooter.channels)
@@ -175,7 +177,9 @@ def _fit_round(
         columns = np.concatenate([slow[i], _free_columns(shooter)[None].repeat(len(miss), 0)], 2)
         a = (columns / white[None, :, None])[there]
         b = (miss / white)[there]
-        spread = np.r_[prior(shooter, i, _some(states[i])) / STEPS, np.full(columns.shape[2] - len(SLOW), 1e4)]
+        spread = np.r_[
+            prior(shooter, i, _some(states[i])) / STEPS, np.full(columns.shape[2] - len(SLOW), 1e4)
+        ]
         normal = a.T @ a + np.diag(1.0 / spread**2)
         change = np.linalg.solve(normal, a.T @ b)[: len(SLOW)]
         change *= min(1.0, 20.0 / max(np.abs(change).max(), 1e-9))  # shortened, never turned

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mjchair.diagnosis.begin import stops
 from mjchair.diagnosis.study import Run
 
 Array = NDArray[np.float64]
@@ -44,7 +45,7 @@ def cut(runs: Sequence[Run], step: float, length: float = LENGTH) -> list[Window
     found = []
     for i, run in enumerate(runs):
         time = run.trial.time
-        begin, end = float(time[0]), float(time[-1])
+        begin, end = float(time[0]), stops(run) or float(time[-1])
         count = max(1, round((end - begin) / length))
         inner = begin + np.round((end - begin) * np.arange(1, count) / count / step) * step
         edges = np.r_[begin, inner, end + step]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from mjchair.diagnosis import candidates, force, linear, noise, nuisance, selection, sensitivity
+from mjchair.diagnosis import begin, candidates, force, linear, noise, nuisance, selection, sensitivity
 from mjchair.diagnosis import gap as gaps
 from mjchair.diagnosis.blas import one_thread
 from mjchair.diagnosis.candidates import Start
@@ -47,6 +47,8 @@ Array = NDArray[np.float64]
 Say = Callable[[str], None]
 MOST = 3  # effects that are added
 ENOUGH = 0.93  # closure beyond which a further effect must be large to be added
+AT_REST = 0.01  # m/s^2, bias of an accelerometer that was seen at rest
+TIE = 6.0  # chi2 within which hypotheses fit alike
 RIVALS = 3  # of one effect, that are refitted
 
 
@@ -85,7 +87,10 @@ def prepare(
     say("states along the runs")
     first = track(shooter, shooter.base, found)
     found = noise.refined(shooter, first, found)
-    nuisances = nuisance.nuisances(study.channels, study.nuisance)
+    given = dict(study.nuisance)
+    if any(begin.stops(run) for run in study.runs):  # at rest the accelerometer showed its bias
+        given.setdefault("bias:imu_accelerometer.x", AT_REST)
+    nuisances = nuisance.nuisances(study.channels, given)
     bench = Bench(shooter, found, nuisances, Whitener(shooter, found))
     say("what is only roughly known")
     fit = Fit(nuisances)
@@ -132,9 +137,7 @@ def screen_columns(
         fit.offsets,
     )
     reduced = linear.reduce(system, bench.windows)
-    return Base(
-        bench, fit, found, nuisances, columns, starts, pulses, answers, system, reduced
-    )
+    return Base(bench, fit, found, nuisances, columns, starts, pulses, answers, system, reduced)
 
 
 def gap_after(base: Base, fitted: Fitted) -> tuple[Gap, System, Reduced]:
@@ -186,9 +189,7 @@ def diagnose(
         return _diagnose(known, effects, say, store)
 
 
-def _diagnose(
-    known: Study, effects: Sequence[Effect], say: Say, store: Store | None
-) -> Diagnosis:
+def _diagnose(known: Study, effects: Sequence[Effect], say: Say, store: Store | None) -> Diagnosis:
     bench, fit, found = prepare(known, say, store)
     base = screen_columns(bench, fit, found, study_effects(known, effects), say)
     say("the gap")
@@ -201,9 +202,7 @@ def _diagnose(
     return _finish(base, gap, fitted, after, rivals, say, chosen)
 
 
-def _choose(
-    base: Base, gap: Gap, say: Say
-) -> tuple[Hypothesis | None, Fitted | None, list[Gap]]:
+def _choose(base: Base, gap: Gap, say: Say) -> tuple[Hypothesis | None, Fitted | None, list[Gap]]:
     """Grow from one effect to as many as the data ask for."""
     reduced, starts = base.reduced, base.starts
     ranked = selection.singles(reduced, starts)
@@ -215,19 +214,18 @@ def _choose(
     after: list[Gap] = []
     for size in range(1, MOST + 1):
         if size == MOST:
-            options.append(
-                selection.grown(reduced, starts, [h.starts for h in options[1][:3]])
-            )
+            options.append(selection.grown(reduced, starts, [h.starts for h in options[1][:3]]))
         if not options[size - 1] or options[size - 1][0].score <= 0.0:
             break
-        tries = options[size - 1][: 2 if size == 1 else 1]
-        found = [(h, _refit(base, h, say)) for h in tries]
-        top, fitted = max(found, key=lambda pair: -pair[1].total - selection.PENALTY * pair[0].free)
+        top = _commonest(base, options[size - 1])
+        fitted = _refit(base, top, say)
         if best is not None:
             gained = best[1].total - fitted.total
             share = gained / max(_gain(base, best[1]), 1.0)
             needed = selection.PENALTY * (top.free - best[0].free) + 15.0
-            if gained < needed or (closure(gap, base, best[1], after[-1]) > ENOUGH and share < 0.05):
+            if gained < needed or (
+                closure(gap, base, best[1], after[-1]) > ENOUGH and share < 0.05
+            ):
                 break
         left, _, _ = gap_after(base, fitted)
         best = (top, fitted)
@@ -236,6 +234,13 @@ def _choose(
             break
     assert best is not None
     return best[0], best[1], after
+
+
+def _commonest(base: Base, options: Sequence[Hypothesis]) -> Hypothesis:
+    """Of the hypotheses that fit alike, the one whose effects stand first in the library."""
+    order = {s.effect.key: k for k, s in reversed(list(enumerate(base.starts)))}
+    alike = [h for h in options if h.score > options[0].score - TIE]
+    return min(alike, key=lambda h: sorted(order[k] for k in h.keys))
 
 
 def _refit(base: Base, hypothesis: Hypothesis, say: Say) -> Fitted:
@@ -294,11 +299,7 @@ def _rivals(
             key = other.effect.key
             if key not in pool or found.score > pool[key].score:
                 pool[key] = found
-        near = [
-            h
-            for h in sorted(pool.values(), key=lambda h: -h.score)
-            if _close(base, chosen, h)
-        ]
+        near = [h for h in sorted(pool.values(), key=lambda h: -h.score) if _close(base, chosen, h)]
         kept = []
         for n, h in enumerate(near):
             if n < RIVALS:
@@ -315,7 +316,9 @@ def _rivals(
 def _paired(theirs: Array, ours: Array) -> float:
     """How many standard errors, over windows, theirs is worse."""
     difference = theirs - ours
-    spread = float(difference.std(ddof=1)) * np.sqrt(difference.size) if difference.size > 1 else 1.0
+    spread = (
+        float(difference.std(ddof=1)) * np.sqrt(difference.size) if difference.size > 1 else 1.0
+    )
     return float(difference.sum() / max(spread, 1e-9))
 
 
@@ -491,7 +494,7 @@ def _where(base: Base, gap: Gap) -> list[dict[str, Any]]:
                     "statistic": float(cells.chi2[k] / cells.dof[k]),
                 }
             )
-    return sorted(out, key=lambda entry: -entry["statistic"])[:12]
+    return sorted(out, key=lambda entry: -float(str(entry["statistic"])))[:12]
 
 
 def _drivers(gap: Gap) -> list[dict[str, Any]]:
@@ -503,9 +506,7 @@ def _drivers(gap: Gap) -> list[dict[str, Any]]:
     ][:8]
 
 
-def _notes(
-    base: Base, gap: Gap, fitted: Fitted | None, closed: float, verdict: str
-) -> list[str]:
+def _notes(base: Base, gap: Gap, fitted: Fitted | None, closed: float, verdict: str) -> list[str]:
     said = list(base.bench.shooter.study.notes)
     for channel, found in base.bench.noise.items():
         if found.source != "study.toml":

@@ -1,0 +1,92 @@
+import mujoco
+import numpy as np
+import pytest
+
+import mjchair
+from mjchair.effects.library import find, library, names
+from mjchair.errors import MjchairError
+
+CONTRACT = {
+    "rolling_resistance": {"coefficient"},
+    "bearing_friction": {"coulomb", "viscous"},
+    "air_drag": {"drag_area"},
+    "wind": {"x", "y"},
+    "floor_slope": {"x", "y"},
+    "toe": {"symmetric", "asymmetric"},
+    "camber": {"angle"},
+    "mass_offset": {"x", "y"},
+    "payload": {"mass", "height"},
+    "wheel_radius": {"left", "right"},
+    "cornering_stiffness": {"front", "rear"},
+    "load_sensitivity": {"exponent"},
+    "tire_friction": {"factor"},
+    "relaxation_length": {"length"},
+    "turning_scrub": {"moment"},
+    "caster_friction": {"moment"},
+    "caster_trail": {"length"},
+    "torque_gain": {"left", "right"},
+    "drive_lag": {"time_constant"},
+    "back_emf": {"coefficient"},
+    "rider_sway": {"mass", "amplitude", "frequency", "phase"},
+    "surface_patch": {"x", "y", "radius", "coefficient"},
+}
+
+
+def test_names_and_parameters_are_those_of_the_contract():
+    for name, parameters in CONTRACT.items():
+        assert {p.name for p in find(name).parameters} == parameters
+    assert set(names()) == {*CONTRACT, "sensor_bias", "sensor_scale", "sensor_delay"}
+
+
+@pytest.mark.parametrize("effect", library(["imu_gyro.z"]), ids=lambda e: e.key)
+def test_an_effect_at_neutral_changes_nothing_and_at_its_start_survives_xml(effect):
+    base = mjchair.load_spec()
+    same = base.copy()
+    effect.apply(same, effect.neutral())
+    a, b = base.copy().compile(), same.compile()
+    with mjchair.installed():
+        runs = [_rolled(a), _rolled(b)]
+        np.testing.assert_allclose(runs[0], runs[1], atol=1e-9)
+        start = effect.starts()[0]
+        spec = base.copy()
+        effect.apply(spec, start.combine(np.ones(len(start.points))))
+        saved = mujoco.MjModel.from_xml_string(spec.to_xml())
+        np.testing.assert_allclose(_rolled(saved), _rolled(spec.compile()), atol=1e-5)
+
+
+def _rolled(model):
+    data = mujoco.MjData(model)
+    data.qvel[0] = 1.0
+    for _ in range(100):
+        mujoco.mj_step(model, data)
+    return data.qvel[:6].copy()
+
+
+def test_rolling_resistance_slows_by_its_coefficient():
+    speeds = []
+    for added in (0.0, 0.01):
+        spec = mjchair.load_spec()
+        find("rolling_resistance").apply(spec, {"coefficient": added})
+        run = mjchair.simulate(spec, None, 2.0, initial={"speed": 1.5})
+        speeds.append(run.channels["velocity.x"][-1])
+    # rotating wheels add 2 % to the inertia of the chair
+    assert (speeds[0] - speeds[1]) / 2.0 == pytest.approx(0.01 * 9.81, rel=0.05)
+
+
+def test_drag_is_the_same_in_plain_python_and_against_the_air():
+    ends = {}
+    for name, values in (("air_drag", {"drag_area": 1.0}), ("wind", {"x": 3.0, "y": 0.0})):
+        spec = mjchair.load_spec()
+        find(name).apply(spec, values)
+        for compiled in (True, False):
+            run = mjchair.simulate(spec, None, 0.1, initial={"speed": 2.0}, compiled=compiled)
+            ends[name, compiled] = run.channels["velocity.x"][-1]
+        assert ends[name, True] == pytest.approx(ends[name, False], abs=1e-12)
+    assert ends["wind", True] > ends["air_drag", True]
+
+
+def test_errors_name_the_value_and_the_rule():
+    with pytest.raises(MjchairError, match="did you mean 'rolling_resistance'"):
+        find("rolling_resistence")
+    with pytest.raises(MjchairError, match="must be within"):
+        find("toe").apply(mjchair.load_spec(), {"symmetric": 2.0})
