@@ -9,7 +9,7 @@ TIME = np.arange(0.0, 3.0, 0.02)
 
 def write(folder, columns, extra="", head='model = "manual"\n'):
     lines = [",".join(["time", *columns])]
-    for k, t in enumerate(TIME if "time" not in columns else columns["time"]):
+    for k, t in enumerate(TIME):
         lines.append(",".join(f"{v}" for v in (t, *(c[k] for c in columns.values()))))
     (folder / "a.csv").write_text("\n".join(lines) + "\n")
     (folder / "study.toml").write_text(f'{head}[[trial]]\nfile = "a.csv"\n{extra}')

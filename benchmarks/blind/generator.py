@@ -484,10 +484,7 @@ def scale(p: dict[str, float], name: str, factor: float) -> None:
     for key in p:
         if key in fixed:
             continue
-        if name == "wind":
-            factor_here = np.sqrt(factor)
-        else:
-            factor_here = factor
+        factor_here = np.sqrt(factor) if name == "wind" else factor
         if name == "tire_friction":
             p[key] = float(np.clip(1.0 - (1.0 - p[key]) * factor, 0.08, 0.9))
         else:

@@ -1,4 +1,4 @@
-"""How a run begins: position, heading, speed and yaw rate at its first sample, from its channels."""
+"""How a run begins: place, heading, speed and yaw rate at its first sample, from its channels."""
 
 from __future__ import annotations
 

@@ -72,7 +72,8 @@ def estimate(study: Study) -> dict[str, Noise]:
 def _channel(study: Study, channel: str) -> Noise:
     pieces = [r.trial.samples(channel) for r in study.runs if channel in r.trial.channels]
     values = [np.unwrap(v) if channel.endswith("heading") else v for _, v in pieces]
-    step = float(np.median([float(np.median(np.diff(t))) for t, _ in pieces if t.size > 1] or [0.01]))
+    steps = [float(np.median(np.diff(t))) for t, _ in pieces if t.size > 1]
+    step = float(np.median(steps or [0.01]))
     rounding = max((_lattice(v) for v in values), default=0.0)
     white = _white(values)
     least = max(floor(channel), rounding / np.sqrt(12.0))

@@ -269,7 +269,7 @@ class Shooter:
 
 
 def residual(measured: Array, predicted: Array, channels: Sequence[str]) -> Array:
-    """Measured minus predicted (rows, channels); angles that wrap are brought within half a turn."""
+    """Measured minus predicted (rows, channels); angles that wrap stay within half a turn."""
     out = measured - predicted
     for i, name in enumerate(channels):
         if name.endswith(ANGLES):

@@ -137,8 +137,9 @@ def make_study(
 def _spec(table: Mapping[str, Any], path: Path) -> mujoco.MjSpec:
     model = str(table.get("model", "manual"))
     near = path.parent / model
-    extra = {"grade": float(table["grade"])} if "grade" in table else {}
-    return load_spec(near if near.is_file() else model, table.get("scene", "flat"), **extra)
+    grade = float(table["grade"]) if "grade" in table else None
+    found = near if near.is_file() else model
+    return load_spec(found, table.get("scene", "flat"), grade=grade)
 
 
 def _runs(

@@ -12,7 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from mjchair.diagnosis import begin, candidates, force, linear, noise, nuisance, selection, sensitivity
+from mjchair.diagnosis import (
+    begin,
+    candidates,
+    force,
+    linear,
+    noise,
+    nuisance,
+    selection,
+    sensitivity,
+)
 from mjchair.diagnosis import gap as gaps
 from mjchair.diagnosis.blas import one_thread
 from mjchair.diagnosis.candidates import Start
@@ -514,7 +523,7 @@ def _notes(base: Base, gap: Gap, fitted: Fitted | None, closed: float, verdict: 
     if verdict == UNKNOWN and fitted is not None:
         names = " and ".join(t.effect.key for t in fitted.fit.terms)
         said.append(
-            f"nothing in the library explains the gap; the nearest, {names}, closes {closed:.0%} of it"
+            f"nothing in the library explains the gap; the nearest, {names}, closes {closed:.0%}"
         )
     return said
 
