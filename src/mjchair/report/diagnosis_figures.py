@@ -18,7 +18,7 @@ from mjchair.diagnosis.observe import Observer
 from mjchair.diagnosis.sensitivity import UNITS, Pulse
 from mjchair.diagnosis.shooting import Job, Shooter, residual
 from mjchair.diagnosis.tracking import Track
-from mjchair.diagnosis.verdict import AMBIGUOUS, NAMED, Diagnosis
+from mjchair.diagnosis.verdict import AMBIGUOUS, NAMED, Diagnosis, Ranked
 from mjchair.diagnosis.windows import Window
 from mjchair.simulation.channels import channels
 
@@ -142,9 +142,18 @@ def _scatter(ax: Axes, at: Array, value: Array, std: Array) -> None:
     ax.grid(alpha=0.3)
 
 
+def leading(diagnosis: Diagnosis, most: int) -> list[Ranked]:
+    """Candidates: those that were chosen first, then the largest in these data."""
+    chosen = {(e.name, e.channel) for e in diagnosis.effects}
+    order = sorted(
+        diagnosis.candidates, key=lambda c: ((c.name, c.channel) not in chosen, -c.detectability)
+    )
+    return order[:most]
+
+
 def candidates(diagnosis: Diagnosis) -> Figure:
     """What every effect alone could do: size against noise, and gain where it was not fitted."""
-    top = diagnosis.candidates[:MOST][::-1]
+    top = leading(diagnosis, MOST)[::-1]
     chosen = {(e.name, e.channel) for e in diagnosis.effects}
     names = [c.name + (f" ({c.channel})" if c.channel else "") for c in top]
     colours = [NEW if (c.name, c.channel) in chosen else FAINT for c in top]
@@ -152,7 +161,7 @@ def candidates(diagnosis: Diagnosis) -> Figure:
     axes = figure.subplots(1, 3, sharey=True)
     columns = (
         ("size in these data (sigma)", [c.detectability for c in top]),
-        ("gain on runs left out (chi²)", [max(c.held_out_gain, 0.0) for c in top]),
+        ("gain on runs left out (chi²)", [c.held_out_gain for c in top]),
         ("likeness to the chosen, |cos|", [c.collinear for c in top]),
     )
     for ax, (label, values) in zip(axes, columns, strict=True):

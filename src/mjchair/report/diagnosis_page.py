@@ -166,7 +166,7 @@ def _force(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> list[str]:
 
 def _candidates(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> list[str]:
     chosen = {(e.name, e.channel) for e in diagnosis.effects}
-    shown = diagnosis.candidates[:CANDIDATES]
+    shown = diagnosis_figures.leading(diagnosis, CANDIDATES)
     rows = [_candidate(c) for c in shown]
     marks = [(c.name, c.channel) in chosen for c in shown]
     head = (
