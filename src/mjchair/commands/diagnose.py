@@ -5,10 +5,30 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
-import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from mjchair.commands import options
+from mjchair.errors import MjchairError
+
+if TYPE_CHECKING:
+    from mjchair.diagnosis.study import Study
+    from mjchair.diagnosis.verdict import Diagnosis
+
+CACHE = "unfinished"  # simulations of a diagnosis that was interrupted
+TOP = (
+    "verdict",
+    "effects",
+    "alternatives",
+    "candidates",
+    "gap",
+    "where",
+    "next_experiment",
+)
+GAP = ("before", "after", "noise_floor", "scope")
+CANDIDATE = ("name", "channel", "held_out_gain", "closure", "detectability", "p_value")
 
 
 def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -17,68 +37,111 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
         "diagnose",
         help="find the effect that a model misses in measured runs",
         description="Find where a model and measured runs disagree, name the missing effect, add "
-        "it. Writes diagnosis.json, report.html, model.xml and figures into --out.",
+        "it. Writes diagnosis.json, report.html, model.xml and figures into --out. The same "
+        "command goes on with an interrupted diagnosis.",
     )
     parser.add_argument("study", metavar="STUDY", help="folder with study.toml and its tables")
     parser.add_argument(
         "--effect", metavar="FILE", action="append", default=[], help="an effect of your own"
     )
+    parser.add_argument("--threads", type=int, default=2, help="default: %(default)s")
     options.add_output(parser, "out/diagnose")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; returns the exit code."""
-    from tqdm import tqdm
-
+    """Diagnose, write everything, and print the verdict on one line."""
+    from mjchair.diagnosis import shooting
     from mjchair.diagnosis.store import Store
     from mjchair.diagnosis.study import read_study
-    from mjchair.diagnosis.workflow import corrected, diagnose
+    from mjchair.diagnosis.workflow import diagnose
     from mjchair.effects.library import from_file
-    from mjchair.model.spec import exact_xml
-    from mjchair.report.diagnosis_page import figures, page
-    from mjchair.storage import output_folder, write_whole
+    from mjchair.storage import check_vacant, output_folder
 
+    if args.threads < 1:
+        raise MjchairError(f"--threads is {args.threads}; it must be at least 1")
+    shooting.THREADS = args.threads
+    kept = Path(args.out) / CACHE
+    force = args.force or _only(kept)
+    check_vacant(args.out, force)
     study = read_study(args.study)
     effects = [from_file(path) for path in args.effect]
-    kept = Path(args.out) / CACHE
-    folder = output_folder(args.out, args.force or (kept.is_dir() and _only(kept)))
-    with tqdm(unit="stage", disable=None, desc="diagnose") as bar:
+    folder = output_folder(args.out, force)
+    try:
+        with _progress() as say:
+            found = diagnose(study, effects=effects, say=say, store=Store(kept))
+            say("report")
+            _write(folder, study, found)
+    except MjchairError:
+        _clear(folder, kept)
+        raise
+    shutil.rmtree(kept, ignore_errors=True)
+    print(f"{_line(found)}; see {folder}/report.html")
+    return 0
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str], None]]:
+    """What to call as a stage begins; shown on a terminal only."""
+    from tqdm import tqdm
+
+    layout = "{elapsed} {n_fmt} stages{postfix}"
+    with tqdm(unit="stage", disable=None, bar_format=layout) as bar:
 
         def say(stage: str) -> None:
             bar.set_postfix_str(stage)
             bar.update()
 
-        diagnosis = diagnose(study, effects=effects, say=say, store=Store(kept))
+        yield say
+
+
+def _write(folder: Path, study: Study, found: Diagnosis) -> None:
+    """Make everything first, then write it, the verdict last."""
+    from mjchair.diagnosis.workflow import corrected
+    from mjchair.model.spec import compile_spec, exact_xml
+    from mjchair.report.diagnosis_page import figures, page
+    from mjchair.storage import write_whole
+
     exact_xml()
-    drawn = figures(diagnosis)
-    for name, image in drawn.items():
-        write_whole(folder / f"{name}.png", image)
-    spec = corrected(study, diagnosis)
-    spec.compile()
-    write_whole(folder / "model.xml", spec.to_xml())
-    write_whole(folder / "report.html", page(diagnosis, drawn))
-    write_whole(folder / "diagnosis.json", json.dumps(diagnosis.to_dict(), indent=1) + "\n")
+    spec = corrected(study, found)
+    compile_spec(spec)
+    drawn = figures(found)
+    files: dict[str, str | bytes] = {f"{name}.png": image for name, image in drawn.items()}
+    files["model.xml"] = spec.to_xml()
+    files["report.html"] = page(found, drawn, f"Diagnosis of {Path(study.source).name}")
+    files["diagnosis.json"] = json.dumps(contract(found), indent=1, allow_nan=False) + "\n"
+    for name, content in files.items():
+        write_whole(folder / name, content)
+
+
+def contract(found: Diagnosis) -> dict[str, Any]:
+    """What diagnosis.json holds; a sensor's effect has its channel besides."""
+    everything = found.to_dict()
+    out = {key: everything[key] for key in TOP}
+    out["gap"] = {key: out["gap"][key] for key in GAP}
+    out["candidates"] = [{k: c[k] for k in CANDIDATE if k in c} for c in out["candidates"]]
+    return out
+
+
+def _clear(folder: Path, kept: Path) -> None:
+    """Leave nothing of a study that could not be diagnosed."""
     shutil.rmtree(kept, ignore_errors=True)
-    print(_line(diagnosis.to_dict()))
-    print(f"wrote {folder}/report.html, diagnosis.json, model.xml", file=sys.stderr)
-    return 0
-
-
-CACHE = "unfinished"  # simulations of a diagnosis that was interrupted
+    if not any(folder.iterdir()):
+        folder.rmdir()
 
 
 def _only(kept: Path) -> bool:
-    return [p.name for p in kept.parent.iterdir()] == [CACHE]
+    """Whether the output folder holds an interrupted diagnosis and nothing else."""
+    return kept.is_dir() and [p.name for p in kept.parent.iterdir()] == [CACHE]
 
 
-def _line(found: dict) -> str:  # type: ignore[type-arg]
-    names = ", ".join(e["name"] for e in found["effects"]) or "no effect"
-    sets = "; cannot be told apart: " + " / ".join(
-        ", ".join(group) for group in found["alternatives"]
-    )
-    gap = found["gap"]
+def _line(found: Diagnosis) -> str:
+    """Verdict, effects and gap on one line."""
+    names = ", ".join(e.name for e in found.effects) or "no effect"
+    sets = " / ".join(" or ".join(group) for group in found.alternatives)
+    gap = found.gap
     return (
-        f"{found['verdict']}: {names}{sets if found['alternatives'] else ''}; "
-        f"gap {gap['before']:.2f} -> {gap['after']:.2f} (noise {gap['noise_floor']:.2f})"
+        f"{found.verdict}: {names}"
+        + (f"; cannot be told apart: {sets}" if sets else "")
+        + f"; gap {gap['before']:.2f} -> {gap['after']:.2f} (noise {gap['noise_floor']:.2f})"
     )

@@ -5,238 +5,342 @@ from __future__ import annotations
 import base64
 import html
 import io
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
 
-import numpy as np
+import matplotlib
 from matplotlib.figure import Figure
 
-from mjchair.diagnosis import force
-from mjchair.diagnosis.shooting import residual
-from mjchair.diagnosis.verdict import Diagnosis
+from mjchair.diagnosis.linear import BAND
+from mjchair.diagnosis.verdict import CLOSES, Diagnosis, Named, Ranked
+from mjchair.effects.library import find
+from mjchair.errors import MjchairError
+from mjchair.report import diagnosis_figures
 
 STYLE = """
-body{font:16px/1.5 system-ui,sans-serif;max-width:58rem;margin:2rem auto;padding:0 1rem;color:#222}
-h1{font-size:1.6rem}h2{font-size:1.2rem;margin-top:2.2rem}img{max-width:100%}
-table{border-collapse:collapse;font-size:.92rem}td,th{padding:.2rem .7rem;text-align:left;
-border-bottom:1px solid #ddd}.verdict{background:#eef3f8;padding:1rem;border-left:4px solid #36c}
+body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#222}
+h1{font-size:1.6rem}h2{font-size:1.2rem;margin-top:2.4rem}img{max-width:100%}
+table{border-collapse:collapse;font-size:.9rem;margin:1rem 0}
+td,th{padding:.2rem .8rem .2rem 0;text-align:left;border-bottom:1px solid #ddd}
+td.n,th.n{text-align:right}tr.chosen{background:#eef3f8}
+.verdict{background:#eef3f8;padding:.8rem 1rem;border-left:4px solid #1f4e9c;font-size:1.1rem}
+.note{color:#555;font-size:.9rem}
 """
-
-
-def _png(figure: Figure) -> bytes:
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110, bbox_inches="tight")
-    return out.getvalue()
+FAMILY = 0.01  # level of the gap test
+CANDIDATES = 14  # rows of the table
 
 
 def figures(diagnosis: Diagnosis) -> dict[str, bytes]:
     """The figures as PNG, by name."""
-    out = {
-        "where": _png(_where(diagnosis)),
-        "force": _png(_force(diagnosis)),
-        "candidates": _png(_candidates(diagnosis)),
-        "runs": _png(_runs(diagnosis)),
+    makers = {
+        "where": diagnosis_figures.where,
+        "force": diagnosis_figures.missing_force,
+        "candidates": diagnosis_figures.candidates,
+        "compared": diagnosis_figures.compared,
+        "gap": diagnosis_figures.gap,
     }
-    return out
+    if not diagnosis.candidates:
+        del makers["candidates"]
+    with matplotlib.rc_context({"font.size": 9.5}):
+        return {name: _png(make(diagnosis)) for name, make in makers.items()}
 
 
-def _where(diagnosis: Diagnosis) -> Figure:
-    base, fitted = diagnosis.stages["base"], diagnosis.stages["fitted"]
-    shooter = base.bench.shooter
-    systems = [("before", base.system)] + ([("after", fitted.system)] if fitted else [])
-    figure = Figure(figsize=(9, 0.28 * len(shooter.channels) + 1.6))
-    axes = figure.subplots(1, len(systems), sharey=True, squeeze=False)[0]
-    labels = [f"{shooter.study.runs[w.run].trial.name} {w.first:.0f} s" for w in shooter.windows]
-    for ax, (name, system) in zip(axes, systems, strict=True):
-        ratio = np.array([c.chi2 / np.maximum(c.dof, 1.0) for c in system.cells]).T
-        image = ax.imshow(np.sqrt(ratio), aspect="auto", cmap="magma_r", vmin=0.5, vmax=4.0)
-        ax.set_title(f"residual over noise, {name}")
-        ax.set_xticks(range(len(labels)), labels, rotation=90, fontsize=6)
-        ax.set_yticks(range(len(shooter.channels)), shooter.channels, fontsize=8)
-    figure.colorbar(image, ax=list(axes), label="rms below 2 Hz / noise (1)")
-    return figure
+def _png(figure: Figure) -> bytes:
+    out = io.BytesIO()
+    figure.savefig(out, format="png", dpi=120)
+    return out.getvalue()
 
 
-def _force(diagnosis: Diagnosis) -> Figure:
-    base = diagnosis.stages["base"]
-    found = force.residual_force(base.bench, base.track, base.pulses, base.answers)
-    known = force.drivers(base.bench, base.track)
-    figure = Figure(figsize=(9, 5.2))
-    axes = figure.subplots(2, 3)
-    shown = (("speed", "m/s"), ("yaw_rate", "rad/s"), ("heading", "rad"))
-    for row, name in zip(axes, ("Fx", "Mz"), strict=True):
-        mine = [k for k, p in enumerate(found.pulses) if p.force == name]
-        for ax, (driver, unit) in zip(row, shown, strict=True):
-            x = []
-            for k in mine:
-                d = known[found.pulses[k].window]
-                at = min(int(np.searchsorted(d["time"], found.pulses[k].time)), len(d["time"]) - 1)
-                x.append(d[driver][at])
-            ax.errorbar(x, found.value[mine], found.std[mine], fmt=".", ms=3, lw=0.4, color="#36c")
-            ax.axhline(0.0, color="#999", lw=0.6)
-            ax.set_xlabel(f"{driver} ({unit})")
-            ax.set_ylabel(f"missing {name} ({'N' if name == 'Fx' else 'N m'})")
-    figure.tight_layout()
-    return figure
+def page(diagnosis: Diagnosis, drawn: Mapping[str, bytes], title: str = "Diagnosis") -> str:
+    """The page as HTML; figures and style are inside.
 
-
-def _candidates(diagnosis: Diagnosis) -> Figure:
-    top = diagnosis.candidates[:14][::-1]
-    figure = Figure(figsize=(9, 0.3 * max(len(top), 3) + 1.2))
-    left, right = figure.subplots(1, 2, sharey=True)
-    names = [c.name + (f" ({c.channel})" if c.channel else "") for c in top]
-    left.barh(names, [c.held_out_gain for c in top], color="#36c")
-    left.set_xlabel("gain on runs left out (chi2)")
-    right.barh(names, [c.detectability for c in top], color="#c63")
-    right.set_xlabel("alone: sigmas")
-    figure.tight_layout()
-    return figure
-
-
-def _runs(diagnosis: Diagnosis) -> Figure:
-    """Measured, old and new model, in the channels where the gap is largest."""
-    base, fitted = diagnosis.stages["base"], diagnosis.stages["fitted"]
-    shooter = base.bench.shooter
-    places = []
-    for entry in diagnosis.where:
-        if (entry["trial"], entry["channel"]) not in places:
-            places.append((entry["trial"], entry["channel"]))
-    places = places[:4]
-    figure = Figure(figsize=(9, 2.0 * max(len(places), 1)))
-    axes = figure.subplots(max(len(places), 1), 1, squeeze=False)[:, 0]
-    for ax, (trial, channel) in zip(axes, places, strict=False):
-        k = shooter.channels.index(channel)
-        for i, w in enumerate(shooter.windows):
-            run = shooter.study.runs[w.run]
-            if run.trial.name != trial:
-                continue
-            time = run.trial.time[w.rows]
-            for track, colour, name in (
-                (base.track, "#c63", "before"),
-                (fitted.track if fitted else None, "#36c", "after"),
-            ):
-                if track is None:
-                    continue
-                miss = residual(shooter.measured(w), track.predicted[i], shooter.channels)[:, k]
-                ax.plot(time, _smooth(miss), color=colour, lw=1.0, label=name if i == 0 else None)
-            ax.axvline(w.first, color="#ddd", lw=0.6)
-        noise = base.bench.noise[channel].total
-        ax.axhspan(-noise, noise, color="#ccc", alpha=0.4, lw=0)
-        ax.set_title(f"{trial}: measured minus simulated {channel}, smoothed", fontsize=9)
-        ax.set_xlabel("time (s)")
-    axes[0].plot([], [], color="#c63", label="before")
-    axes[0].plot([], [], color="#36c", label="after")
-    axes[0].legend(fontsize=8)
-    figure.tight_layout()
-    return figure
-
-
-def _smooth(values: Any) -> Any:
-    filled = np.where(np.isnan(values), np.nanmean(values), values)
-    width = min(15, max(1, filled.size // 4))
-    edge = np.pad(filled, width // 2, mode="edge")
-    return np.convolve(edge, np.ones(width) / width, mode="valid")[: filled.size]
-
-
-DECIDED = "These data decide; nothing is needed."
-COLUMNS = (
-    "name",
-    "channel",
-    "held_out_gain",
-    "closure",
-    "detectability",
-    "p_value",
-    "collinear",
-)
-WORDS = {
-    "none": "The model explains these runs: nothing beyond the noise is left.",
-    "named": "One explanation stands.",
-    "ambiguous": "An effect is missing, and these runs cannot tell which of a few it is.",
-    "unknown": "The model misses something that is not in the library.",
-}
-
-
-def page(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> str:
-    """The page as HTML; figures are inside."""
-    found = diagnosis.to_dict()
-    gap = found["gap"]
+    Args:
+      drawn: figures by name, as `figures` makes them. title: of the page, such as the study's.
+    """
     parts = [
-        "<!doctype html><html lang=en><meta charset=utf-8><title>Diagnosis</title>",
-        f"<style>{STYLE}</style><h1>Diagnosis: {html.escape(found['verdict'])}</h1>",
-        f"<p class=verdict>{WORDS[found['verdict']]}{_effects(found)}</p>",
-        "<h2>1. Where model and measurement disagree</h2>",
-        "<p>Each window of about 2 s starts from its own fitted state, so only forces show. Rms "
-        f"of the whitened residual: <b>{gap['before']:.2f}</b> before, "
-        f"<b>{gap['after']:.2f}</b> after, noise floor {gap['noise_floor']:.2f} "
-        f"({html.escape(gap['scope'])}). The chance of such tests without any gap: "
-        f"{gap['p_value']:.2g} before, {gap['p_value_after']:.2g} after.</p>",
-        _image(drawn, "where"),
-        _table(found["where"], ("trial", "channel", "window", "regime", "statistic")),
-        "<h2>2. What force would close the gap, and what it goes with</h2>",
-        _image(drawn, "force"),
-        _table(found["drivers"], ("force", "goes_with", "sigmas")),
-        "<h2>3. Which effects could make it</h2>",
-        "<p>Every effect alone, fitted with what is only roughly known (mass, centre of mass, "
-        "inertia, tire stiffness, sensor bias). Collinear: how much of it looks like the chosen "
-        "one, 1 being alike.</p>",
-        _image(drawn, "candidates"),
-        _table(
-            found["candidates"][:14],
-            (
-                "name",
-                "channel",
-                "held_out_gain",
-                "closure",
-                "detectability",
-                "p_value",
-                "collinear",
-            ),
-        ),
-        "<h2>4. The corrected model beside the old one</h2>",
-        _image(drawn, "runs"),
-        "<h2>5. What to do next</h2>",
-        f"<p>{html.escape(found['next_experiment'] or DECIDED)}</p>",
-        "<h2>Notes</h2><ul>",
-        *(f"<li>{html.escape(note)}</li>" for note in found["notes"]),
-        "</ul></html>",
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">',
+        f"<title>{html.escape(title)}</title><style>{STYLE}</style></head><body>",
+        f"<h1>{html.escape(title)}</h1>",
+        f'<p class="verdict">{sentence(diagnosis)}</p>',
+        *_where(diagnosis, drawn),
+        *_force(diagnosis, drawn),
+        *_candidates(diagnosis, drawn),
+        *_choice(diagnosis),
+        *_compared(diagnosis, drawn),
+        *_gap(diagnosis, drawn),
+        *_next(diagnosis),
+        *_assumed(diagnosis),
+        "</body></html>",
     ]
-    return "\n".join(parts)
+    return "\n".join(parts) + "\n"
 
 
-def _effects(found: Mapping[str, Any]) -> str:
-    out = ""
-    for e in found["effects"]:
-        values = ", ".join(
-            f"{k} {v['value']:.4g}"
-            + (f" &plusmn; {v['std']:.2g}" if v["std"] is not None else " (held)")
-            + f" {html.escape(v['unit'])}"
-            for k, v in e["parameters"].items()
-        )
-        out += f" <b>{html.escape(e['name'])}</b>: {values}; closes {e['closure']:.0%}."
-    for group in found["alternatives"]:
-        out += " Cannot be told apart: " + html.escape(", ".join(group)) + "."
-    return out
+def sentence(diagnosis: Diagnosis) -> str:
+    """The verdict in one sentence, as HTML."""
+    effects = ", and ".join(_effect(e) for e in diagnosis.effects)
+    if diagnosis.verdict == "none":
+        return "The chair explains these runs: nothing is left that the noise would not give."
+    if diagnosis.verdict == "named":
+        return f"The chair lacks {effects}."
+    if diagnosis.verdict == "ambiguous":
+        sets = "; ".join(" or ".join(_bold(n) for n in group) for group in diagnosis.alternatives)
+        undecided = f"these runs cannot tell {sets} apart" if sets else "the evidence is thin"
+        return f"Something is missing, and {undecided}; the corrected chair has {effects}."
+    return "Something is missing that no effect of the library explains, so none is named."
 
 
-def _image(drawn: Mapping[str, bytes], name: str) -> str:
-    data = base64.b64encode(drawn[name]).decode()
-    return f'<img alt="{name}" src="data:image/png;base64,{data}">'
+def _bold(name: str) -> str:
+    return f"<b>{html.escape(name.replace('_', ' '))}</b>"
 
 
-def _table(rows: list[dict[str, Any]], columns: tuple[str, ...]) -> str:
-    head = "".join(f"<th>{c.replace('_', ' ')}</th>" for c in columns)
-    body = "".join(
-        "<tr>" + "".join(f"<td>{_cell(row.get(c, ''))}</td>" for c in columns) + "</tr>"
-        for row in rows
+def _effect(effect: Named) -> str:
+    """Name and parameters."""
+    on = f" on {html.escape(effect.channel)}" if effect.channel else ""
+    return f"{_bold(effect.name)}{on} ({', '.join(_parameters(effect))})"
+
+
+def _parameters(effect: Named) -> Iterable[str]:
+    for name, p in effect.parameters.items():
+        unit = "" if p["unit"] == "1" else f" {html.escape(str(p['unit']))}"
+        spread = " held" if p["std"] is None else f" ± {p['std']:.2g}"
+        yield f"{html.escape(name.replace('_', ' '))} {p['value']:.4g}{spread}{unit}"
+
+
+def _where(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> list[str]:
+    p = float(diagnosis.gap.get("p_value", 1.0))
+    exists = (
+        "is not worth a search: the verdict is none"
+        if diagnosis.verdict == "none"
+        else "is more than noise"
     )
-    return f"<table><tr>{head}</tr>{body}</table>"
+    cells = diagnosis.where[:8]
+    rows = [
+        (
+            html.escape(str(w["trial"])),
+            html.escape(str(w["channel"])),
+            f"{w['window'][0]:.1f} to {w['window'][1]:.1f} s",
+            html.escape("; ".join(f"{k.replace('_', ' ')} {v}" for k, v in w["regime"].items())),
+            f"{w['statistic']:.2f}",
+        )
+        for w in cells
+    ]
+    return [
+        "<h2>1. Where model and measurement disagree</h2>",
+        f"<p>Every window of about 2 s is simulated from its own fitted state, so that only forces "
+        f"show. All tests together: chance of such a gap from noise alone p = {p:.2g}, "
+        f"at a level of {FAMILY:g}. It {exists}.</p>",
+        _image(drawn, "where", "Residual over noise, by channel and window"),
+        _table(("trial", "channel", "window", "regime", "!chi² / dof (1)"), rows),
+        f'<p class="note">chi² / dof of the residual below {BAND:g} Hz against the noise of the '
+        "channel; 1 is what noise gives. The largest cells are listed.</p>",
+    ]
 
 
-def _cell(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.3g}"
-    if isinstance(value, dict):
-        return html.escape(", ".join(f"{k} {v}" for k, v in value.items()))
-    if isinstance(value, list):
-        return " to ".join(f"{v:g}" for v in value) + " s"
-    return html.escape(str(value))
+def _force(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> list[str]:
+    rows = [
+        (
+            "forward force" if d["force"] == "Fx" else "yaw moment",
+            html.escape(str(d["goes_with"]).replace("_", " ")),
+            f"{d['sigmas']:.1f}",
+        )
+        for d in diagnosis.drivers
+    ]
+    left = "What is left goes with" if diagnosis.effects else "It goes with"
+    said = (
+        f"<p>{left}:</p>" + _table(("force", "goes with", "!sigma"), rows)
+        if rows
+        else "<p>After the correction no force is left that goes with anything tested.</p>"
+        if diagnosis.effects
+        else "<p>No force that goes with anything tested stands out.</p>"
+    )
+    return [
+        "<h2>2. What force would close the gap, and what it goes with</h2>",
+        "<p>In the chair's own frame, without any named effect: a constant level with the sign of "
+        "the speed reads as rolling or bearing friction, a parabola over speed as air, a wave over "
+        "the heading as a slope or wind.</p>",
+        _image(drawn, "force", "Missing force against speed, yaw rate, heading and torque"),
+        '<p class="note">Dots: every 0.2 s. Circles: means with standard errors, drawn towards '
+        "zero where the data say little.</p>",
+        said,
+    ]
+
+
+def _candidates(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> list[str]:
+    chosen = {(e.name, e.channel) for e in diagnosis.effects}
+    shown = diagnosis_figures.leading(diagnosis, CANDIDATES)
+    rows = [_candidate(c) for c in shown]
+    marks = [(c.name, c.channel) in chosen for c in shown]
+    head = (
+        "effect",
+        "what it looks like",
+        "!size (sigma)",
+        "!gain left out (chi²)",
+        "!closes",
+        "!|cos|",
+        "!p",
+    )
+    sets = "; ".join(" / ".join(_bold(n) for n in group) for group in diagnosis.alternatives)
+    apart = (
+        f"Not to be told apart by these data: {sets}."
+        if sets
+        else "No two explanations are left that these data cannot tell apart."
+        if diagnosis.verdict == "named"
+        else ""
+    )
+    return [
+        "<h2>3. Which effects could make it, and which look alike</h2>",
+        "<p>Every effect alone, beside what is only roughly known (mass, centre of mass, inertia, "
+        f"tire stiffness, sensor bias). {apart}</p>",
+        _image(drawn, "candidates", "Candidates: size, gain on runs left out, likeness"),
+        _table(head, rows, marks),
+        '<p class="note">Gain: drop of chi² on each run when the effect was fitted to the others. '
+        "|cos|: how much of the effect, in these data, looks like the chosen ones; 1 is alike. p: "
+        "of the effect alone, for no effect; small values of many rows are one gap seen many times."
+        "</p>",
+    ]
+
+
+def _candidate(c: Ranked) -> tuple[str, ...]:
+    name = html.escape(c.name.replace("_", " ") + (f" ({c.channel})" if c.channel else ""))
+    return (
+        name,
+        html.escape(_signature(c)),
+        f"{c.detectability:.1f}",
+        f"{c.held_out_gain:.0f}",
+        f"{c.closure:.0%}",
+        f"{c.collinear:.2f}",
+        f"{c.p_value:.1g}",
+    )
+
+
+def _signature(c: Ranked) -> str:
+    """The effect's one line; nothing for an effect of the user's own."""
+    try:
+        return find(c.name, c.channel).signature
+    except MjchairError:
+        return ""
+
+
+def _choice(diagnosis: Diagnosis) -> list[str]:
+    out = ["<h2>4. Which one it is</h2>"]
+    if diagnosis.verdict == "none":
+        return [*out, "<p>None is named, since there is no gap to explain.</p>"]
+    if diagnosis.verdict == "unknown":
+        return [
+            *out,
+            f"<p>None is named: no effect, nor two or three together, closes {CLOSES:.0%} of the "
+            "gap and holds on runs left out. Section 2 is what is known of the force.</p>",
+        ]
+    rows = []
+    for e in diagnosis.effects:
+        for name, p in e.parameters.items():
+            on = f" ({e.channel})" if e.channel else ""
+            rows.append(
+                (
+                    html.escape(e.name.replace("_", " ") + on),
+                    html.escape(name.replace("_", " ")),
+                    f"{p['value']:.4g}",
+                    "held" if p["std"] is None else f"{p['std']:.2g}",
+                    html.escape(str(p["unit"])),
+                    f"{e.closure:.0%}",
+                )
+            )
+    head = ("effect", "parameter", "!value", "!standard deviation", "unit", "!closes")
+    why = (
+        "It is significant, holds on runs that it was not fitted to, closes most of the gap, and "
+        "no rival comes near."
+        if diagnosis.verdict == "named"
+        else "It is one explanation that fits; another of its set fits about as well, or its "
+        "parameter is not clearly away from nothing."
+    )
+    return [*out, f"<p>{why}</p>", _table(head, rows)]
+
+
+def _compared(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> list[str]:
+    runs = diagnosis.stages["base"].bench.shooter.study.runs
+    held = any(r.hold_out for r in runs)
+    which = (
+        "Runs that were held out of every fit"
+        if held
+        else "No run is held out in this study (`hold_out = true`), so these are runs of the fit"
+    )
+    return [
+        "<h2>5. The corrected chair beside the old one</h2>",
+        f"<p>{which}. Each is simulated in one go from its first state, with the measured inputs; "
+        "small errors pile up here, which is why nothing above is judged by it.</p>",
+        _image(drawn, "compared", "Measured, old and corrected chair over whole runs"),
+    ]
+
+
+def _gap(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> list[str]:
+    g = diagnosis.gap
+    rows = [
+        ("before", f"{g['before']:.2f}"),
+        ("after", f"{g['after']:.2f}"),
+        ("noise floor", f"{g['noise_floor']:.2f}"),
+    ]
+    left = ""
+    if diagnosis.effects:
+        p = float(g.get("p_value_after", 1.0))
+        left = f"<p>All tests again on what is left: p = {p:.2g}"
+        left += ", below the level: something small is left.</p>" if p < FAMILY else ": noise.</p>"
+    return [
+        "<h2>6. The gap before, after, and the noise</h2>",
+        _image(drawn, "gap", "Gap of every trial before and after"),
+        _table(("gap", "!rms over noise (1)"), rows),
+        f'<p class="note">Scope of the table: {html.escape(str(g["scope"]))}.</p>',
+        left,
+    ]
+
+
+def _next(diagnosis: Diagnosis) -> list[str]:
+    said = html.escape(diagnosis.next_experiment) or "These data decide; none is needed."
+    return ["<h2>7. The experiment to do next</h2>", f"<p>{said}</p>"]
+
+
+def _assumed(diagnosis: Diagnosis) -> list[str]:
+    base = diagnosis.stages["base"]
+    moved = [
+        (
+            html.escape(n.name.replace("_", " ")),
+            f"{n.std:.3g}",
+            html.escape(n.unit),
+            f"{base.fit.offsets[n.name]:+.2f}",
+        )
+        for n in base.bench.nuisances
+        if n.name in base.fit.offsets
+    ]
+    return [
+        "<h2>8. What was assumed</h2>",
+        "<ul>",
+        *(f"<li>{html.escape(note)}</li>" for note in diagnosis.notes),
+        "<li>The corrected chair (model.xml) has the effects of section 4 in it and nothing else: "
+        "what is only roughly known stays as it was given.</li>",
+        "</ul>",
+        "<p>What is only roughly known, and how far the fit moved it:</p>",
+        _table(
+            ("quantity", "!prior sd", "unit", "!moved by (prior sd)"),
+            moved,
+        ),
+    ]
+
+
+def _image(drawn: Mapping[str, bytes], name: str, alt: str) -> str:
+    if name not in drawn:
+        return ""
+    data = base64.b64encode(drawn[name]).decode()
+    return f'<img alt="{html.escape(alt)}" src="data:image/png;base64,{data}">'
+
+
+def _table(
+    head: Sequence[str], rows: Sequence[Sequence[str]], marks: Sequence[bool] | None = None
+) -> str:
+    """A table of cells that are HTML; columns whose head starts with ! hold numbers."""
+    if not rows:
+        return ""
+    kind = [' class="n"' if h.startswith("!") else "" for h in head]
+    top = "".join(f"<th{k}>{h.lstrip('!')}</th>" for k, h in zip(kind, head, strict=True))
+    body = ""
+    for i, row in enumerate(rows):
+        cells = "".join(f"<td{k}>{c}</td>" for k, c in zip(kind, row, strict=True))
+        body += f'<tr class="chosen">{cells}</tr>' if marks and marks[i] else f"<tr>{cells}</tr>"
+    return f"<table><tr>{top}</tr>{body}</table>"

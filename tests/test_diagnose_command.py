@@ -1,0 +1,165 @@
+"""`mjchair diagnose` and `mjchair hide`: what they write, and what they say to bad input."""
+
+import json
+import math
+import re
+
+import mujoco
+import numpy as np
+import pytest
+
+import mjchair
+from mjchair import cli
+from mjchair.commands.diagnose import CANDIDATE, GAP, TOP
+from mjchair.effects.library import find
+
+CHANNELS = {"left_wheel_speed": 0.02, "right_wheel_speed": 0.02, "imu_gyro.z": 0.01}
+
+
+def write_study(folder, coefficient=0.02, seconds=3.0, extra=""):
+    """Two coasts, one each way, with rolling resistance that the chair does not have."""
+    folder.mkdir(parents=True)
+    rng = np.random.default_rng(1)
+    spec = mjchair.load_spec()
+    find("rolling_resistance").apply(spec, {"coefficient": coefficient})
+    lines = ['model = "manual"', *extra.splitlines()]
+    for k, heading in enumerate((0.0, math.pi)):
+        start = {"speed": 1.4, "heading": heading}
+        run = mjchair.simulate(spec, None, seconds, initial=start, sample_rate=50.0)
+        noisy = [run[c] + std * rng.standard_normal(run.time.size) for c, std in CHANNELS.items()]
+        table = np.column_stack([run.time, *noisy])
+        header = ",".join(["time", *CHANNELS])
+        np.savetxt(folder / f"coast_{k}.csv", table, "%.6f", ",", header=header, comments="")
+        lines += ["[[trial]]", f'file = "coast_{k}.csv"', 'manoeuvre = "coast"']
+        lines += ["[trial.initial]", f"heading = {heading}"]
+    (folder / "study.toml").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """A study that was diagnosed, and where its results are."""
+    top = tmp_path_factory.mktemp("diagnose")
+    study = write_study(top / "study")
+    assert cli.main(["diagnose", str(study), "--out", str(top / "out")]) == 0
+    return study, top / "out"
+
+
+def test_writes_what_it_says(done):
+    _, out = done
+    names = {p.name for p in out.iterdir()}
+    assert {"diagnosis.json", "report.html", "model.xml", "where.png", "compared.png"} <= names
+    assert "unfinished" not in names and not [n for n in names if n.startswith(".")]
+    for name in (n for n in names if n.endswith(".png")):
+        assert (out / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_json_has_the_keys_of_its_contract(done):
+    found = json.loads((done[1] / "diagnosis.json").read_text())
+    assert tuple(found) == TOP
+    assert found["verdict"] in ("none", "named", "ambiguous", "unknown")
+    assert tuple(found["gap"]) == GAP
+    assert found["candidates"]
+    for candidate in found["candidates"]:
+        assert set(candidate) | {"channel"} == set(CANDIDATE)
+    for effect in found["effects"]:
+        assert {"name", "parameters", "closure"} <= set(effect)
+        for parameter in effect["parameters"].values():
+            assert set(parameter) == {"value", "std", "unit"}
+    for cell in found["where"]:
+        assert set(cell) == {"trial", "channel", "window", "regime", "statistic"}
+
+
+def test_a_gap_this_large_is_seen(done):
+    found = json.loads((done[1] / "diagnosis.json").read_text())
+    assert found["verdict"] != "none"
+    assert found["gap"]["before"] > 1.0
+
+
+def test_report_opens_offline(done):
+    page = (done[1] / "report.html").read_text()
+    assert not re.search(r"""(src|href)\s*=\s*(?!"data:)""", page)
+    assert not re.search(r"https?://|<script|<link|@import|url\(", page)
+    assert page.count("data:image/png;base64,") == len(list(done[1].glob("*.png")))
+    assert [int(n) for n in re.findall(r"<h2>(\d)\.", page)] == [1, 2, 3, 4, 5, 6, 7, 8]
+
+
+def test_the_corrected_chair_rolls(done, tmp_path):
+    model = done[1] / "model.xml"
+    assert mujoco.MjModel.from_xml_path(str(model)).nu > 0
+    out = str(tmp_path / "roll")
+    arguments = ["simulate", "--model", str(model), "--duration", "0.2", "--out", out]
+    assert cli.main(arguments) == 0
+
+
+def test_results_are_not_overwritten(done, capsys):
+    study, out = done
+    before = {p.name: p.stat().st_mtime_ns for p in out.iterdir()}
+    assert cli.main(["diagnose", str(study), "--out", str(out)]) == 2
+    assert one_line(capsys) and before == {p.name: p.stat().st_mtime_ns for p in out.iterdir()}
+
+
+def one_line(capsys) -> str:
+    said = capsys.readouterr().err.strip()
+    assert said and "\n" not in said and "Traceback" not in said
+    return said
+
+
+def broken_toml(study):
+    (study / "study.toml").write_text("model = ")
+
+
+def no_table(study):
+    (study / "coast_1.csv").unlink()
+
+
+def no_trial(study):
+    (study / "study.toml").write_text('model = "manual"\n')
+
+
+def all_held_out(study):
+    text = (study / "study.toml").read_text()
+    (study / "study.toml").write_text(text.replace("[trial.", "hold_out = true\n[trial."))
+
+
+def unknown_model(study):
+    text = (study / "study.toml").read_text()
+    (study / "study.toml").write_text(text.replace('"manual"', '"manuall"'))
+
+
+def short_trial(study):
+    lines = (study / "coast_0.csv").read_text().splitlines()
+    (study / "coast_0.csv").write_text("\n".join(lines[:20]) + "\n")
+
+
+@pytest.mark.parametrize(
+    "spoil", [broken_toml, no_table, no_trial, all_held_out, unknown_model, short_trial]
+)
+def test_bad_studies_are_one_line_and_nothing_is_written(spoil, done, tmp_path, capsys):
+    study = tmp_path / "study"
+    study.mkdir()
+    for path in done[0].iterdir():
+        (study / path.name).write_bytes(path.read_bytes())
+    spoil(study)
+    assert cli.main(["diagnose", str(study), "--out", str(tmp_path / "out")]) == 2
+    assert one_line(capsys).startswith("mjchair: ")
+    assert not (tmp_path / "out").exists()
+
+
+def test_bad_arguments_are_one_line_and_nothing_is_written(done, tmp_path, capsys):
+    out = tmp_path / "out"
+    for arguments in (
+        ["diagnose", str(tmp_path / "nowhere"), "--out", str(out)],
+        ["diagnose", str(done[0]), "--out", str(out), "--threads", "0"],
+        ["diagnose", str(done[0]), "--out", str(out), "--effect", str(tmp_path / "mine.py")],
+        ["hide", "--out", str(out)],
+        ["hide", "rolling_resistence", "--out", str(out)],
+        ["hide", "rolling_resistance", "--set", "coefficient=9", "--out", str(out)],
+        ["hide", "rolling_resistance", "--set", "coefficient=x", "--out", str(out)],
+        ["hide", "sensor_bias", "--out", str(out)],
+        ["hide", "sensor_bias:imu_gyro.x", "--out", str(out)],
+        ["hide", "--reveal", str(tmp_path / "nowhere")],
+    ):
+        assert cli.main(arguments) == 2, arguments
+        assert one_line(capsys)
+        assert not out.exists(), arguments
