@@ -19,7 +19,7 @@ from mjchair.diagnosis.windows import Window, cut
 from mjchair.effects import rider_sway
 from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
-from mjchair.model.wheels import COMFORTABLE, base_name, cut_damping, check_timestep
+from mjchair.model.wheels import COMFORTABLE, base_name, check_timestep, cut_damping
 from mjchair.simulation import names
 from mjchair.simulation.channels import channels
 
