@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
+from threadpoolctl import threadpool_limits
 
 from mjchair.diagnosis import (
     begin,
@@ -23,7 +24,6 @@ from mjchair.diagnosis import (
     sensitivity,
 )
 from mjchair.diagnosis import gap as gaps
-from mjchair.diagnosis.blas import one_thread
 from mjchair.diagnosis.candidates import Start
 from mjchair.diagnosis.experiments import suggest
 from mjchair.diagnosis.fitting import Bench, Fit, Fitted, nuisance_columns, refit, solve
@@ -194,7 +194,8 @@ def diagnose(
       MjchairError: a study that cannot be read or simulated, as one line.
     """
     known = study if isinstance(study, Study) else read_study(study)
-    with one_thread():
+    # threads cost the linear algebra more than they bring on matrices this small
+    with threadpool_limits(1, user_api="blas"):
         return _diagnose(known, effects, say, store)
 
 
