@@ -40,7 +40,8 @@ def test_the_papers_figures_at_2_kn():
 
 
 def test_the_measured_set_at_210_n():
+    """Both readings of a0; the expected digits are cut after the first, not rounded."""
     a148 = -read_tire("wheelchair_a0_148").forces(210.0, 0.0, np.radians([5, 10, 15])).Fy
     a048 = -read_tire("wheelchair_a0_048").forces(210.0, 0.0, np.radians([5, 10, 15])).Fy
-    np.testing.assert_allclose(a148, [31.9, 43.6, 45.7], atol=0.06)
-    np.testing.assert_allclose(a048, [22.3, 26.6, 28.2], atol=0.06)
+    np.testing.assert_allclose(a148, [31.9, 43.6, 45.7], atol=0.1)
+    np.testing.assert_allclose(a048, [22.3, 26.6, 28.2], atol=0.1)
