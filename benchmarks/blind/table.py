@@ -48,17 +48,24 @@ def table(lines: list[dict]) -> str:
     inside = [x for x in kind["one"] + kind["two"] if x["answer"]["sigma"] >= 15.0]
     errors, covered = _errors(strong)
     sizes = [len(returned(x)) for x in strong if returned(x)]
+    false = [bool(named(x)) for x in kind["none"]]
+    right = [first(x) in x["answer"]["hidden"] for x in strong]
+    inset = [bool(set(x["answer"]["hidden"]) & returned(x)) for x in strong]
+    wrong = [bool(set(named(x)) - set(x["answer"]["hidden"])) for x in inside]
+    both = [set(x["answer"]["hidden"]) <= set(named(x)) for x in kind["two"]]
+    quiet = [not named(x) for x in kind["outside"]]
+    times = [x["seconds"] for x in lines]
     rows = [
-        ("false names without an effect", "at most 1 of 60", _share([bool(named(x)) for x in kind["none"]])),
-        ("right name first, 15 sigma or more", ">= 90 %", _share([first(x) in x["answer"]["hidden"] for x in strong])),
-        ("truth in the returned set, 15 sigma or more", ">= 97 %", _share([bool(set(x["answer"]["hidden"]) & returned(x)) for x in strong])),
+        ("false names without an effect", "at most 1 of 60", _share(false)),
+        ("right name first, 15 sigma or more", ">= 90 %", _share(right)),
+        ("truth in the returned set, 15 sigma or more", ">= 97 %", _share(inset)),
         ("median size of the set", "<= 2", f"{np.median(sizes):g}" if sizes else "no case"),
         ("parameter error, median", "<= 5 %", f"{np.median(errors):.1%}" if errors else "no case"),
         ("95 % interval covers", "88-98 %", _share(covered)),
-        ("a wrong name committed to", "none", _share([bool(set(named(x)) - set(x["answer"]["hidden"])) for x in inside])),
-        ("both of two effects named", ">= 75 %", _share([set(x["answer"]["hidden"]) <= set(named(x)) for x in kind["two"]])),
-        ("outside the library: no name", ">= 85 %", _share([not named(x) for x in kind["outside"]])),
-        ("seconds, median", "", f"{np.median([x['seconds'] for x in lines]):.0f}" if lines else ""),
-    ]  # fmt: skip
+        ("a wrong name committed to", "none", _share(wrong)),
+        ("both of two effects named", ">= 75 %", _share(both)),
+        ("outside the library: no name", ">= 85 %", _share(quiet)),
+        ("seconds, median", "", f"{np.median(times):.0f}" if times else ""),
+    ]
     head = "| figure | aim | result |\n|---|---|---|\n"
     return head + "\n".join(f"| {a} | {b} | {c} |" for a, b, c in rows)
