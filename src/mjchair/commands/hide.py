@@ -44,7 +44,12 @@ def run(args: argparse.Namespace) -> int:
     effect = find(name, channel or None)
     values = dict(_value(text) for text in args.set)
     folder = output_folder(args.out, args.force)
-    hide(effect, folder, values or None, args.seed)
+    try:
+        hide(effect, folder, values or None, args.seed)
+    except MjchairError:
+        if not any(folder.iterdir()):
+            folder.rmdir()
+        raise
     print(f"wrote {folder}/study.toml and its tables", file=sys.stderr)
     return 0
 

@@ -161,7 +161,7 @@ def candidates(diagnosis: Diagnosis) -> Figure:
     axes = figure.subplots(1, 3, sharey=True)
     columns = (
         ("size in these data (sigma)", [c.detectability for c in top]),
-        ("gain on runs left out (chi²)", [c.held_out_gain for c in top]),
+        ("gain on runs left out (chi²)", _cut([c.held_out_gain for c in top])),
         ("likeness to the chosen, |cos|", [c.collinear for c in top]),
     )
     for ax, (label, values) in zip(axes, columns, strict=True):
@@ -171,6 +171,12 @@ def candidates(diagnosis: Diagnosis) -> Figure:
     axes[0].tick_params(axis="y", labelsize=8.5)
     axes[2].set_xlim(0.0, 1.0)
     return figure
+
+
+def _cut(gains: list[float]) -> list[float]:
+    """Gains, with losses cut at half of the largest gain: how bad is of no interest."""
+    least = -0.5 * max([*gains, 1.0])
+    return [max(g, least) for g in gains]
 
 
 def gap(diagnosis: Diagnosis) -> Figure:

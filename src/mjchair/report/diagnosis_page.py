@@ -83,8 +83,12 @@ def sentence(diagnosis: Diagnosis) -> str:
         return f"The chair lacks {effects}."
     if diagnosis.verdict == "ambiguous":
         sets = "; ".join(" or ".join(_bold(n) for n in group) for group in diagnosis.alternatives)
-        undecided = f"these runs cannot tell {sets} apart" if sets else "the evidence is thin"
-        return f"Something is missing, and {undecided}; the corrected chair has {effects}."
+        undecided = (
+            f"it may be {sets}, which these runs cannot tell apart"
+            if sets
+            else "the evidence for it is thin"
+        )
+        return f"Something is missing: {undecided}; the corrected chair has {effects}."
     return "Something is missing that no effect of the library explains, so none is named."
 
 
@@ -126,13 +130,18 @@ def _where(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> list[str]:
     return [
         "<h2>1. Where model and measurement disagree</h2>",
         f"<p>Every window of about 2 s is simulated from its own fitted state, so that only forces "
-        f"show. All tests together: chance of such a gap from noise alone p = {p:.2g}, "
+        f"show. All tests together: chance of such a gap from noise alone {_p(p)}, "
         f"at a level of {FAMILY:g}. It {exists}.</p>",
         _image(drawn, "where", "Residual over noise, by channel and window"),
         _table(("trial", "channel", "window", "regime", "!chi² / dof (1)"), rows),
         f'<p class="note">chi² / dof of the residual below {BAND:g} Hz against the noise of the '
         "channel; 1 is what noise gives. The largest cells are listed.</p>",
     ]
+
+
+def _p(p: float) -> str:
+    """A probability; below what a number can hold it is said so."""
+    return f"p = {p:.2g}" if p > 1e-300 else "p &lt; 1e-300"
 
 
 def _force(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> list[str]:
@@ -193,7 +202,8 @@ def _candidates(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> list[str]:
         _image(drawn, "candidates", "Candidates: size, gain on runs left out, likeness"),
         _table(head, rows, marks),
         '<p class="note">Gain: drop of chi² on each run when the effect was fitted to the others. '
-        "|cos|: how much of the effect, in these data, looks like the chosen ones; 1 is alike. p: "
+        "Bars of losses are cut. |cos|: how much of the effect, in these data, looks like the "
+        "chosen ones; 1 is alike. p: "
         "of the effect alone, for no effect; small values of many rows are one gap seen many times."
         "</p>",
     ]
@@ -208,7 +218,7 @@ def _candidate(c: Ranked) -> tuple[str, ...]:
         f"{c.held_out_gain:.0f}",
         f"{c.closure:.0%}",
         f"{c.collinear:.2f}",
-        f"{c.p_value:.1g}",
+        _p(c.p_value).removeprefix("p = ").removeprefix("p "),
     )
 
 
@@ -281,7 +291,7 @@ def _gap(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> list[str]:
     left = ""
     if diagnosis.effects:
         p = float(g.get("p_value_after", 1.0))
-        left = f"<p>All tests again on what is left: p = {p:.2g}"
+        left = f"<p>All tests again on what is left: {_p(p)}"
         left += ", below the level: something small is left.</p>" if p < FAMILY else ": noise.</p>"
     return [
         "<h2>6. The gap before, after, and the noise</h2>",
@@ -298,16 +308,17 @@ def _next(diagnosis: Diagnosis) -> list[str]:
 
 
 def _assumed(diagnosis: Diagnosis) -> list[str]:
-    base = diagnosis.stages["base"]
+    base, fitted = diagnosis.stages["base"], diagnosis_figures.fitted_fit(diagnosis)
+    offsets = base.fit.offsets if fitted is None else fitted.fit.offsets
     moved = [
         (
             html.escape(n.name.replace("_", " ")),
             f"{n.std:.3g}",
             html.escape(n.unit),
-            f"{base.fit.offsets[n.name]:+.2f}",
+            f"{offsets[n.name]:+.2f}",
         )
         for n in base.bench.nuisances
-        if n.name in base.fit.offsets
+        if n.name in offsets
     ]
     return [
         "<h2>8. What was assumed</h2>",
