@@ -1,4 +1,4 @@
-"""Errors: one base class, and the helper that finds the nearest name."""
+"""Errors: one base class, and the nearest name to a wrong one."""
 
 from __future__ import annotations
 

@@ -168,7 +168,7 @@ def still_baseline(run: PushRim) -> Baseline:
 def without_baseline(run: PushRim, baseline: PushRim | None = None) -> PushRim:
     """The recording with the baseline taken off its forces.
 
-    The encoder's zero stays where it is between two recordings of one session, so a baseline is
+    The encoder's zero stays where it is between two recordings made in a row, so a baseline is
     taken at the same wheel angle.
 
     Args:
