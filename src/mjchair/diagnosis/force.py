@@ -66,19 +66,6 @@ def _angle(qpos: Array, qvel: Array, chair: Chair, wheel: int) -> Array:
     return np.asarray(qpos[:, dof + 1])  # one quaternion before it: qpos is one longer than qvel
 
 
-@dataclass(frozen=True)
-class Driver:
-    """A force that depends on something: columns of pulse sizes.
-
-    Attributes:
-      name: what it depends on. force: which. shapes: functions of the drivers at a time.
-    """
-
-    name: str
-    force: str
-    shapes: tuple[object, ...]
-
-
 SHAPES = {
     "speed": lambda d: [
         np.tanh(d["speed"] / 0.05),

@@ -19,6 +19,7 @@ from mjchair.diagnosis.windows import Window, cut
 from mjchair.effects import rider_sway
 from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
+from mjchair.model.looks import without_looks
 from mjchair.model.wheels import COMFORTABLE, base_name, check_timestep, cut_damping
 from mjchair.simulation import names
 from mjchair.simulation.channels import channels
@@ -56,16 +57,6 @@ class Outcome:
     trace: dict[str, Array] = field(default_factory=dict)
 
 
-def stripped(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """A copy without what is only seen: bodies have explicit inertials, so nothing else changes."""
-    light = spec.copy()
-    explicit = all(b.explicitinertial for b in light.bodies[1:])
-    for geom in list(light.geoms):
-        if explicit and not geom.contype and not geom.conaffinity:
-            light.delete(geom)
-    return light
-
-
 class Shooter:
     """Simulates windows of a study's runs.
 
@@ -83,7 +74,7 @@ class Shooter:
         self.store = store
         self.study = study
         self.channels = study.channels
-        self.spec = stripped(study.spec)
+        self.spec = without_looks(study.spec)
         self.base = self.spec.copy().compile()
         self.chair = Chair(self.base)
         self.step = float(self.base.opt.timestep)
@@ -111,16 +102,19 @@ class Shooter:
         spec = self.spec.copy()
         if edit is not None:
             edit(spec)
-        if coarse:
-            spec.option.timestep *= self.coarse / self.step
         try:
             model = spec.compile()
-            if coarse:
-                cut_damping(model, above=COMFORTABLE)  # also under more than the nominal load
-            return model
+            return self.coarsened(model) if coarse else model
         except ValueError as error:
             line = " ".join(str(error).split())
             raise MjchairError(f"an effect does not compile: {line}") from None
+
+    def coarsened(self, model: mujoco.MjModel) -> mujoco.MjModel:
+        """A copy at the coarse step, its tires stable also under more than their nominal load."""
+        coarse = copy.copy(model)
+        coarse.opt.timestep *= self.coarse / self.step
+        cut_damping(coarse, above=COMFORTABLE)
+        return coarse
 
     def input_step(self) -> float:
         """Median time between samples of the inputs, s; 0 where nothing is driven."""

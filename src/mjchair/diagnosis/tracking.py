@@ -5,7 +5,6 @@ The fast part of the state is handed from window to window by the simulation its
 
 from __future__ import annotations
 
-import copy
 from dataclasses import dataclass
 
 import mujoco
@@ -18,7 +17,6 @@ from mjchair.diagnosis.noise import Noise
 from mjchair.diagnosis.observe import Observer
 from mjchair.diagnosis.shooting import Job, Shooter, residual
 from mjchair.engine.install import installed
-from mjchair.model.wheels import COMFORTABLE, cut_damping
 from mjchair.simulation import names
 from mjchair.simulation.initial import start
 
@@ -98,9 +96,7 @@ def track(
         model that is not far.
     """
     chair = shooter.chair
-    coarse = copy.copy(model)
-    coarse.opt.timestep *= shooter.coarse / shooter.step
-    cut_damping(coarse, above=COMFORTABLE)
+    coarse = shooter.coarsened(model)
     white = np.array([noise[c].total for c in shooter.channels])
     observer = observer or Observer(shooter.channels)
     count = len(shooter.windows)

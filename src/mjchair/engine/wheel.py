@@ -29,7 +29,6 @@ from mjchair.tire import block, law
 DYN_USER = int(mjtDyn.mjDYN_USER)
 TRN_JOINT = int(mjtTrn.mjTRN_JOINT)
 OBJ_ACTUATOR = int(mjtObj.mjOBJ_ACTUATOR)
-OBJ_SITE = int(mjtObj.mjOBJ_SITE)
 SENSOR_USER = int(mjtSensor.mjSENS_USER)
 
 # a sensor's own block, in its `user` field

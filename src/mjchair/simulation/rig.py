@@ -42,6 +42,11 @@ CELL_ARM = 0.3  # m, of the lateral cells ahead of and behind the wheel
 HELD = 1e9  # kg m^2, armature of a wheel whose spin is imposed
 
 
+def _check_range(name: str, value: float, low: float, high: float, unit: str) -> None:
+    if not low <= value <= high:
+        raise MjchairError(f"{name} is {value:g} {unit}; it must be within {low:g} to {high:g}")
+
+
 @dataclass(frozen=True)
 class Point:
     """One run of the rig.
@@ -72,10 +77,7 @@ class Point:
             ("camber", self.camber, -45.0, 45.0, "deg"),
             ("kappa", 0.0 if self.kappa is None else self.kappa, -1.0, 10.0, "1"),
         ):
-            if not low <= value <= high:
-                raise MjchairError(
-                    f"{name} is {value:g} {unit}; it must be within {low:g} to {high:g}"
-                )
+            _check_range(name, value, low, high, unit)
 
 
 @dataclass(frozen=True)
@@ -101,10 +103,7 @@ class Faults:
             ("hidden camber", self.camber, -45.0, 45.0, "deg"),
             ("noise", self.noise, 0.0, 10.0, "of the largest force"),
         ):
-            if not low <= value <= high:
-                raise MjchairError(
-                    f"{name} is {value:g} {unit}; it must be within {low:g} to {high:g}"
-                )
+            _check_range(name, value, low, high, unit)
 
 
 @dataclass(frozen=True)
