@@ -7,9 +7,11 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 
 from mjchair.cli import main
-from mjchair.diagnosis.linear import Reduced
+from mjchair.diagnosis import linear
+from mjchair.diagnosis.linear import System
 from mjchair.diagnosis.noise import Noise
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks" / "blind"))
@@ -60,13 +62,30 @@ def test_bad_input_is_one_line(tmp_path, capsys):
     assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_reduced_gain_is_that_of_least_squares():
+@pytest.mark.parametrize("size", [0.3, 20.0])  # nuisances within their walls, and on them
+def test_reduced_gain_is_that_of_bounded_least_squares(size):
     rng = np.random.default_rng(0)
-    columns, r = rng.standard_normal((50, 3)), rng.standard_normal(50)
-    reduced = Reduced(["a", "b", "c"], columns.T @ columns, columns.T @ r)
-    fit = np.linalg.lstsq(columns[:, :2], r, rcond=None)[0]
-    left = r - columns[:, :2] @ fit
-    assert reduced.gain([0, 1]) == pytest.approx(r @ r - left @ left, rel=1e-6)
+    columns = rng.standard_normal((50, 5))
+    r = columns @ np.array([size, -size, 0.2, 1.0, -2.0]) + rng.standard_normal(50)
+    back = np.array([0.5, -1.0, 0.2])
+    names = ["n0", "n1", "n2", "a", "b"]
+    G, b, c = columns.T @ columns, columns.T @ r, r @ r
+    system = System(names, 3, 0, G[None], b[None], np.array([c]), np.zeros(1, int), back)
+    reduced = linear.reduce(system, [0])
+
+    def best(count):
+        """Chi2 with the priors of the nuisances, which may not pass their walls."""
+        prior = np.hstack([np.eye(3), np.zeros((3, count))])
+        a = np.vstack([columns[:, : 3 + count], prior])
+        wall = np.r_[np.full(3, linear.WALL), np.full(count, np.inf)]
+        off = np.r_[back, np.zeros(count)]
+        found = lsq_linear(a, np.r_[r, -back], (-wall - off, wall - off), tol=1e-14)
+        return 2.0 * found.cost
+
+    assert (np.abs(linear.fit(system, [0], [])[0][:3] + back) > 2.999).any() == (size > 1.0)
+    assert reduced.total == pytest.approx(best(0), rel=1e-6)
+    assert reduced.gain([0, 1]) == pytest.approx(best(0) - best(2), rel=1e-5)
+    assert linear.fit(system, [0], [3, 4])[1] == pytest.approx(best(2), rel=1e-6)
 
 
 def test_noise_covariance_is_that_of_white_and_correlated_noise():

@@ -20,7 +20,6 @@ from mjchair.diagnosis.tracking import Track, track
 from mjchair.effects.effect import Effect, Values, clip
 
 Array = NDArray[np.float64]
-FARTHEST = 2.0  # prior standard deviations that a nuisance is moved before it is linear again
 SENSOR = {"sensor_bias": "bias", "sensor_scale": "scale", "sensor_delay": "delay"}
 
 
@@ -83,6 +82,21 @@ class Bench:
         """Indices of the windows that may be fitted to."""
         fitted = set(self.shooter.study.fitted)
         return np.array([i for i, w in enumerate(self.shooter.windows) if w.run in fitted])
+
+    def system(
+        self, found: Track, columns: dict[str, Column], nuisance: int, fit: Fit, free: int = 0
+    ) -> System:
+        """The linear system around a track of the chair of `fit`; see `linear.build`."""
+        return linear.build(
+            self.shooter,
+            found,
+            columns,
+            nuisance,
+            self.whitener,
+            self.windows,
+            fit.offsets,
+            free,
+        )
 
 
 def nuisance_columns(bench: Bench, found: Track, fit: Fit) -> dict[str, Column]:
@@ -165,7 +179,8 @@ class Fitted:
     Attributes:
       fit, track: where the system is linear. columns: of nuisances and terms.
       system: nuisances first, then a column a free parameter.
-      chi2: (windows,) with the last linear step put in. std: term key -> standard deviation, SI.
+      step: (p,) the last linear step. chi2: of the windows fitted to, with that step put in.
+      total: their sum, with the priors of the nuisances. std: term key -> standard deviation, SI.
       at_bound: parameters that ended on a bound.
     """
 
@@ -173,24 +188,11 @@ class Fitted:
     track: Track
     columns: dict[str, Column]
     system: System
+    step: Array
     chi2: Array
+    total: float
     std: dict[str, float]
     at_bound: tuple[str, ...]
-
-    @property
-    def total(self) -> float:
-        """Chi2 of the windows fitted to, with the priors of the nuisances."""
-        return float(self.chi2.sum())
-
-
-def solve(system: System, windows: NDArray[np.int64]) -> Array:
-    """Coefficients (p,) of all columns."""
-    n, back = system.nuisance, system.back
-    G, b = system.G[windows].sum(axis=0), system.b[windows].sum(axis=0)
-    size = np.maximum(np.diag(G), 1e-12)
-    precision = np.r_[np.ones(n), 1e-8 * size[n:]]
-    b = b - np.r_[back, np.zeros(len(b) - n)]
-    return np.asarray(np.linalg.solve(G + np.diag(precision), b))
 
 
 def refit(
@@ -216,21 +218,17 @@ def refit(
         columns = dict(nuisances or nuisance_columns(bench, found, fit))
         count = len(columns)
         columns.update(term_columns(bench, found, fit))
-        system = linear.build(
-            shooter, found, bench.noise, columns, count, bench.whitener, fit.offsets
-        )
-        step = solve(system, bench.windows)
+        system = bench.system(found, columns, count, fit)
+        step, total = linear.fit(system, bench.windows, range(count, len(system.names)))
+        spread = linear.spread(system, bench.windows)
         if turn == rounds:
             break
         moved = _moved(fit, system, step)
-        small = np.abs(step[count:]) < 0.02 * np.maximum(
-            _spread(system, bench.windows)[count:], 1e-9
-        )
-        if turn and small.all():
+        small = np.abs(step[count:]) < 0.02 * np.maximum(spread[count:], 1e-9)
+        if turn and small.size and small.all():
             break
         fit = moved
     chi2 = np.array([linear.chi2(system, i, step) for i in bench.windows])
-    spread = _spread(system, bench.windows)
     std, bound = {}, []
     for k, key in enumerate(system.names[count:]):
         term, name = _term(fit, key)
@@ -239,17 +237,7 @@ def refit(
         if term.values[name] in (p.low, p.high) and not p.low == p.neutral == term.values[name]:
             bound.append(key)
     assert found is not None
-    return Fitted(fit, found, columns, system, chi2, std, tuple(bound))
-
-
-def _spread(system: System, windows: NDArray[np.int64]) -> Array:
-    n = system.nuisance
-    G = system.G[windows].sum(axis=0)
-    size = np.maximum(np.diag(G), 1e-12)
-    full = G + np.diag(np.r_[np.ones(n), 1e-8 * size[n:]])
-    scale = np.sqrt(np.diag(full))
-    inverse = np.linalg.inv(full / np.outer(scale, scale))
-    return np.asarray(np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale)
+    return Fitted(fit, found, columns, system, step, chi2, total, std, tuple(bound))
 
 
 def _term(fit: Fit, key: str) -> tuple[Term, str]:
@@ -262,7 +250,7 @@ def _moved(fit: Fit, system: System, step: Array) -> Fit:
     mechanical = {n.name for n in fit.nuisances if n.edit is not None}
     for name, by in zip(system.names[: system.nuisance], step, strict=False):
         if name in mechanical:
-            offsets[name] = float(np.clip(offsets.get(name, 0.0) + by, -FARTHEST, FARTHEST))
+            offsets[name] = float(np.clip(offsets.get(name, 0.0) + by, -linear.WALL, linear.WALL))
     terms = []
     for term in fit.terms:
         values = dict(term.values)

@@ -7,7 +7,7 @@ residual. Every test, fit and score after that is made of sums of those.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,13 @@ from mjchair.diagnosis.shooting import Shooter, residual
 from mjchair.diagnosis.tracking import Track, prior
 
 Array = NDArray[np.float64]
+Active = tuple[tuple[int, float], ...]
 BAND = 2.0  # Hz, below which a residual is looked at in cells
 RIDGE = 1e-9
+# prior standard deviations beyond which no nuisance is believed: without a wall a centre of mass
+# 22 mm aside passes for a nuisance of 2 mm, at the price of a chi2 that no rival must pay
+WALL = 3.0
+SETTLE = 12  # rounds of finding which nuisances stand on their walls
 SEEN = 1e-4  # share of a column that must survive the elimination
 
 
@@ -30,14 +35,13 @@ class Cells:
 
     Attributes:
       chi2: (channels,), of the slow components. dof: (channels,). total: chi2 of all together.
-      total_dof: its degrees of freedom. everything: chi2 and count of all samples.
+      total_dof: its degrees of freedom.
     """
 
     chi2: Array
     dof: Array
     total: float
     total_dof: float
-    everything: tuple[float, int]
 
 
 @dataclass
@@ -46,19 +50,22 @@ class System:
 
     Attributes:
       names: of the columns. nuisance: how many of them, at the start, are nuisances with unit
-        prior. G: (windows, p, p). b: (windows, p). c: (windows,) chi2 of the residual.
-      cells: slow parts. run: (windows,) index of the run. back: (nuisance,) where the model
-        already stands from the centre of its priors, in standard deviations.
+        prior. free: how many of those, the last, are effects that are in, without prior.
+      G: (windows, p, p). b: (windows, p). c: (windows,) chi2 of the residual.
+      run: (windows,) index of the run. back: (nuisance,) where the model already stands from the
+        centre of its priors, in standard deviations.
+      cells: slow parts, with the best nuisances put in.
     """
 
     names: list[str]
     nuisance: int
+    free: int
     G: Array
     b: Array
     c: Array
-    cells: list[Cells]
     run: NDArray[np.int64]
     back: Array
+    cells: list[Cells] = field(default_factory=list)
 
     def index(self, names: Sequence[str]) -> list[int]:
         """Places of columns."""
@@ -127,23 +134,25 @@ def slow_columns(shooter: Shooter, track: Track, window: int) -> tuple[Array, Ar
 def build(
     shooter: Shooter,
     track: Track,
-    noise: dict[str, Noise],
     columns: dict[str, list[Array]],
     nuisance: int,
-    whitener: Whitener | None = None,
-    offsets: dict[str, float] | None = None,
+    white: Whitener,
+    windows: NDArray[np.int64],
+    offsets: dict[str, float],
+    free: int = 0,
 ) -> System:
     """Eliminate every window's slow state and form the products.
 
     Args:
       columns: name -> (rows, channels) a window; nuisances first, scaled by their priors.
+      nuisance: how many are. windows: that are fitted to. offsets: where nuisances already are.
+      free: how many of the nuisances, the last, are effects that are in.
     """
-    white = whitener or Whitener(shooter, noise)
     names = list(columns)
     p = len(names)
     count = len(shooter.windows)
     G, b, c = np.zeros((count, p, p)), np.zeros((count, p)), np.zeros(count)
-    cells = []
+    bands = []
     raw = np.zeros(p)
     for i, w in enumerate(shooter.windows):
         miss = residual(shooter.measured(w), track.predicted[i], shooter.channels)
@@ -157,14 +166,18 @@ def build(
         b[i] = J.T @ r - ZJ.T @ cho_solve(factor, Zr)
         raw += (J * J).sum(axis=0)
         c[i] = r @ r - Zr @ cho_solve(factor, Zr)
-        cells.append(_cells(white.sizes(i), w.last - w.first, r, Z, factor))
+        known = np.column_stack([r, J[:, :nuisance]])
+        bands.append(_bands(white.sizes(i), w.last - w.first, known, Z, factor))
     # what a free initial state takes away whole is nothing but rounding afterwards
     hidden = G.sum(axis=0).diagonal() < SEEN * raw
     hidden[:nuisance] = False
     G[:, hidden, :], G[:, :, hidden], b[:, hidden] = 0.0, 0.0, 0.0
     run = np.array([w.run for w in shooter.windows])
-    back = np.array([(offsets or {}).get(n, 0.0) for n in names[:nuisance]])
-    return System(names, nuisance, G, b, c, cells, run, back)
+    back = np.array([offsets.get(n, 0.0) for n in names[:nuisance]])
+    system = System(names, nuisance, free, G, b, c, run, back)
+    step = fit(system, windows, [])[0][:nuisance]
+    system.cells = [_cells(band, step) for band in bands]
+    return system
 
 
 def basis(sizes: Sequence[int], span: float) -> list[Array]:
@@ -180,101 +193,208 @@ def basis(sizes: Sequence[int], span: float) -> list[Array]:
     return out
 
 
-def _cells(
-    sizes: Sequence[int], span: float, r: Array, Z: Array, factor: tuple[Array, bool]
-) -> Cells:
-    left = r - Z @ cho_solve(factor, Z.T @ r)
+def _bands(
+    sizes: Sequence[int], span: float, known: Array, Z: Array, factor: tuple[Array, bool]
+) -> list[Array]:
+    """Slow components of residual and nuisances, white: each channel's, then all together's.
+
+    Args:
+      known: (samples, 1 + nuisances), the residual first.
+
+    Returns:
+      (components, 1 + nuisances) each.
+    """
+    left = known - Z @ cho_solve(factor, Z.T @ known)
     edges = np.r_[0, np.cumsum(sizes)]
     waves = basis(sizes, span)
     u = [w.T @ left[edges[k] : edges[k + 1]] for k, w in enumerate(waves)]
     BZ = [w.T @ Z[edges[k] : edges[k + 1]] for k, w in enumerate(waves)]
-    chi2, dof = np.zeros(len(sizes)), np.zeros(len(sizes))
-    for k in range(len(sizes)):
-        spread = np.eye(len(u[k])) - BZ[k] @ cho_solve(factor, BZ[k].T)
-        chi2[k], dof[k] = _quadratic(u[k], spread)
-    all_u, all_BZ = np.concatenate(u), np.vstack(BZ)
-    spread = np.eye(all_u.size) - all_BZ @ cho_solve(factor, all_BZ.T)
-    total, total_dof = _quadratic(all_u, spread)
-    return Cells(chi2, dof, total, total_dof, (float(left @ left), int(edges[-1])))
+    out = []
+    for mine, theirs in [*zip(u, BZ, strict=True), (np.vstack(u), np.vstack(BZ))]:
+        # over the directions that the elimination left
+        values, vectors = np.linalg.eigh(np.eye(len(mine)) - theirs @ cho_solve(factor, theirs.T))
+        keep = values > 0.2
+        out.append(vectors[:, keep].T @ mine / np.sqrt(values[keep])[:, None])
+    return out
 
 
-def _quadratic(u: Array, spread: Array) -> tuple[float, float]:
-    """u' spread^+ u over the directions that the elimination left, and how many there are."""
-    if not u.size:
-        return 0.0, 0.0
-    values, vectors = np.linalg.eigh(spread)
-    keep = values > 0.2
-    along = vectors[:, keep].T @ u
-    return float((along**2 / values[keep]).sum()), float(keep.sum())
+def _cells(bands: list[Array], step: Array) -> Cells:
+    left = [band[:, 0] - band[:, 1:] @ step for band in bands]
+    chi2 = np.array([float(u @ u) for u in left])
+    dof = np.array([float(u.size) for u in left])
+    return Cells(chi2[:-1], dof[:-1], float(chi2[-1]), float(dof[-1]))
 
 
 @dataclass
 class Reduced:
-    """Sums over windows with the nuisances eliminated: what single effects are judged by.
+    """Sums over windows with the nuisances eliminated: what effects are judged by.
 
     Attributes:
-      G: (q, q). b: (q,). names: of the q columns.
+      names: of the q columns. G: (q, q). b: (q,). total: chi2 with its priors, no column put in.
+      sums: what it was made of, for columns that move a nuisance onto its wall or off it.
+      active: nuisances that stand on a wall, (index, side). rest: those that do not.
+      centre, lean: (rest,), (rest, q): the nuisances are centre - lean @ coefficients.
     """
 
     names: list[str]
     G: Array
     b: Array
+    total: float
+    sums: Sums
+    active: Active
+    rest: list[int]
+    centre: Array
+    lean: Array
 
     def gain(self, which: Sequence[int]) -> float:
         """Drop of chi2 that the columns bring."""
-        return float(self.b[list(which)] @ self.solve(which))
+        found, coefficients = self._settled(which)
+        return self.total - found.total + float(found.b[list(which)] @ coefficients)
 
     def solve(self, which: Sequence[int]) -> Array:
         """Their coefficients."""
+        return self._settled(which)[1]
+
+    def _settled(self, which: Sequence[int]) -> tuple[Reduced, Array]:
+        """The elimination whose walls are right for these columns, and their coefficients."""
+        found = self
         w = list(which)
+        for _ in range(SETTLE):
+            coefficients = found._alone(w)
+            active = found._walls(w, coefficients)
+            if active == found.active:
+                break
+            found = found.sums.eliminated(active)
+        return found, found._alone(w)
+
+    def _alone(self, w: list[int]) -> Array:
         block = self.G[np.ix_(w, w)]
         scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
         unit = block / np.outer(scale, scale) + 1e-8 * np.eye(len(w))
         return np.asarray(np.linalg.solve(unit, self.b[w] / scale) / scale)
 
-    def std(self, which: Sequence[int]) -> Array:
-        """Standard deviations of their coefficients."""
-        w = list(which)
-        block = self.G[np.ix_(w, w)]
-        scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
-        unit = block / np.outer(scale, scale) + 1e-8 * np.eye(len(w))
-        return np.asarray(np.sqrt(np.diag(np.linalg.inv(unit))) / scale)
+    def _walls(self, w: list[int], coefficients: Array) -> Active:
+        """Which nuisances stand on a wall with these columns put in."""
+        sums = self.sums
+        free = self.centre - self.lean[:, w] @ coefficients
+        place = free + sums.back[self.rest]
+        beyond = np.abs(place) > sums.wall[self.rest] + 1e-9
+        if not self.active and not beyond.any():
+            return ()
+        held = [(self.rest[k], float(np.sign(place[k]))) for k in np.flatnonzero(beyond)]
+        full = np.zeros(len(sums.b))
+        full[self.rest] = free
+        full[sums.count + np.array(w, int)] = coefficients
+        for i, side in self.active:
+            full[i] = side * sums.wall[i] - sums.back[i]
+        for i, side in self.active:  # let go what would rather come back
+            pull = sums.b[i] - sums.G[i] @ full - sums.precision[i] * (full[i] + sums.back[i])
+            if pull * side > 0.0:
+                held.append((i, side))
+        return tuple(sorted(held))
 
 
-def reduce(system: System, windows: Sequence[int] | NDArray[np.int64], free: int = 0) -> Reduced:
-    """Sum over the windows and eliminate the nuisances (unit prior).
+@dataclass
+class Sums:
+    """A system summed over windows.
+
+    Attributes:
+      names: of all columns. count: how many are nuisances. G: (p, p). b: (p,). c: chi2.
+      back: (count,) where the model stands from the centre of the priors, in standard deviations.
+      precision: (count,) of the priors. wall: (count,) beyond which no nuisance is believed.
+      known: eliminations that were made.
+    """
+
+    names: list[str]
+    count: int
+    G: Array
+    b: Array
+    c: float
+    back: Array
+    precision: Array
+    wall: Array
+    known: dict[Active, Reduced] = field(default_factory=dict)
+
+    def eliminated(self, active: Active) -> Reduced:
+        """The sums without nuisances; those of `active` stand on their walls."""
+        if active not in self.known:
+            self.known[active] = self._eliminate(active)
+        return self.known[active]
+
+    def _eliminate(self, active: Active) -> Reduced:
+        n = self.count
+        held = [i for i, _ in active]
+        rest = [i for i in range(n) if i not in held]
+        at = np.array([side * self.wall[i] for i, side in active])
+        moved = at - self.back[held]
+        b = self.b - self.G[:, held] @ moved
+        total = self.c - 2.0 * self.b[held] @ moved + moved @ self.G[np.ix_(held, held)] @ moved
+        total += self.precision[held] @ at**2 + self.precision[rest] @ self.back[rest] ** 2
+        inner = self.G[np.ix_(rest, rest)] + np.diag(self.precision[rest] + 1e-12)
+        known = b[rest] - self.precision[rest] * self.back[rest]
+        cross = self.G[np.ix_(rest, range(n, len(b)))]
+        if rest:
+            factor = cho_factor(inner)
+            centre, lean = cho_solve(factor, known), cho_solve(factor, cross)
+        else:
+            centre, lean = known, cross
+        return Reduced(
+            self.names[n:],
+            self.G[n:, n:] - cross.T @ lean,
+            b[n:] - cross.T @ centre,
+            float(total - known @ centre),
+            self,
+            active,
+            rest,
+            centre,
+            lean,
+        )
+
+    def plain(self) -> Reduced:
+        """The elimination that is right where no column is put in."""
+        return self.eliminated(())._settled([])[0]
+
+
+def reduce(system: System, windows: Sequence[int] | NDArray[np.int64]) -> Reduced:
+    """Sum over the windows and eliminate the nuisances."""
+    w, n, free = list(windows), system.nuisance, system.free
+    G, b = system.G[w].sum(axis=0), system.b[w].sum(axis=0)
+    precision, wall = np.ones(n), np.full(n, WALL)
+    precision[n - free :] = 1e-8 * np.maximum(np.diag(G)[n - free : n], 1e-12)
+    wall[n - free :] = np.inf
+    sums = Sums(system.names, n, G, b, float(system.c[w].sum()), system.back, precision, wall)
+    return sums.plain()
+
+
+def fit(
+    system: System, windows: Sequence[int] | NDArray[np.int64], which: Sequence[int]
+) -> tuple[Array, float]:
+    """Coefficients (p,) of nuisances and of the columns `which`, zero elsewhere; chi2 with priors.
 
     Args:
-      free: how many of the nuisances, the last ones, have no prior: effects already accepted.
+      which: places among all columns, none of a nuisance.
     """
-    w = list(windows)
     n = system.nuisance
-    G, b = system.G[w].sum(axis=0), system.b[w].sum(axis=0)
-    b[:n] -= system.back
-    precision = np.ones(n)
-    if free:
-        precision[n - free :] = 1e-8 * np.diag(G)[n - free : n]
-    inner = cho_factor(G[:n, :n] + np.diag(precision + 1e-12))
-    cross = G[:n, n:]
-    return Reduced(
-        system.names[n:],
-        G[n:, n:] - cross.T @ cho_solve(inner, cross),
-        b[n:] - cross.T @ cho_solve(inner, b[:n]),
-    )
-
-
-def fit(system: System, windows: Sequence[int] | NDArray[np.int64], which: Sequence[int]) -> Array:
-    """Coefficients (p,) of the nuisances and of the columns `which`; zero elsewhere."""
-    w, n = list(windows), system.nuisance
-    use = [*range(n), *which]
-    G = system.G[w].sum(axis=0)[np.ix_(use, use)]
-    size = np.maximum(np.diag(G), 1e-12)
-    precision = np.r_[np.ones(n), 1e-8 * size[n:]]
-    b = system.b[w].sum(axis=0)[use]
-    b[:n] -= system.back
+    plain = reduce(system, windows)
+    columns = [i - n for i in which]
+    found, coefficients = plain._settled(columns)
     out = np.zeros(len(system.names))
-    out[use] = np.linalg.solve(G + np.diag(precision), b)
-    return out
+    out[found.rest] = found.centre - found.lean[:, columns] @ coefficients
+    for i, side in found.active:
+        out[i] = side * found.sums.wall[i] - system.back[i]
+    out[list(which)] = coefficients
+    return out, found.total - float(found.b[columns] @ coefficients)
+
+
+def spread(system: System, windows: NDArray[np.int64]) -> Array:
+    """Standard deviations (p,) of all coefficients together."""
+    n = system.nuisance
+    G = system.G[windows].sum(axis=0)
+    size = np.maximum(np.diag(G), 1e-12)
+    full = G + np.diag(np.r_[np.ones(n), 1e-8 * size[n:]])
+    scale = np.sqrt(np.diag(full))
+    inverse = np.linalg.inv(full / np.outer(scale, scale))
+    return np.asarray(np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale)
 
 
 def chi2(system: System, window: int, coefficients: Array) -> float:

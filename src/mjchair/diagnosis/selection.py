@@ -191,12 +191,12 @@ def held_out(
     which = system.index(columns)
     # nuisances are those of all runs: one run alone hardly determines them, and their
     # extrapolation would drown what the effect itself predicts
-    plain, full = linear.fit(system, windows, []), linear.fit(system, windows, which)
+    (plain, _), (full, _) = (linear.fit(system, windows, w) for w in ([], which))
     gains = np.zeros(len(windows))
     for part in sorted(set(label)):
         inside = names == part
         theirs = full.copy()
-        theirs[which] = linear.fit(system, windows[~inside], which)[which]
+        theirs[which] = linear.fit(system, windows[~inside], which)[0][which]
         for k in np.flatnonzero(inside):
             i = int(windows[k])
             gains[k] = linear.chi2(system, i, plain) - linear.chi2(system, i, theirs)

@@ -21,7 +21,7 @@ from mjchair.simulation import names
 from mjchair.simulation.initial import start
 
 Array = NDArray[np.float64]
-ROUNDS = 2  # Gauss-Newton rounds a window
+ROUNDS = 2  # Gauss-Newton rounds a window; one where a track is near
 
 
 @dataclass
@@ -117,7 +117,7 @@ def track(
                     states[i] = before.states[i].copy()
                 elif states[i] is None:
                     states[i] = firsts[w.run].copy()
-            for _ in range(ROUNDS):
+            for _ in range(ROUNDS if before is None else 1):
                 _fit_round(
                     shooter,
                     chair,

@@ -26,7 +26,7 @@ from mjchair.diagnosis import (
 from mjchair.diagnosis import gap as gaps
 from mjchair.diagnosis.candidates import Start
 from mjchair.diagnosis.experiments import suggest
-from mjchair.diagnosis.fitting import Bench, Fit, Fitted, nuisance_columns, refit, solve
+from mjchair.diagnosis.fitting import Bench, Fit, Fitted, nuisance_columns, refit
 from mjchair.diagnosis.gap import Gap
 from mjchair.diagnosis.linear import Reduced, System, Whitener
 from mjchair.diagnosis.selection import Hypothesis
@@ -55,6 +55,7 @@ from mjchair.effects.library import library
 Array = NDArray[np.float64]
 Say = Callable[[str], None]
 MOST = 3  # effects that are added
+FAR = 1.5  # prior standard deviations: a nuisance there is not what moved
 ENOUGH = 0.93  # closure beyond which a further effect must be large to be added
 AT_REST = 0.01  # m/s^2, bias of an accelerometer that was seen at rest
 TIE = 6.0  # chi2 within which hypotheses fit alike
@@ -63,22 +64,25 @@ RIVALS = 3  # of one effect, that are refitted
 
 @dataclass
 class Base:
-    """The study's chair, with its nuisances fitted, and every column around it.
+    """The study's chair with every column around it.
 
     Attributes:
-      bench, fit, track: where everything is linear. nuisances: their columns, by name.
-      columns: of effects and forces. starts: what the effects' columns mean.
-      pulses, answers: forces in time and what they change. system, reduced: the linear algebra.
+      bench: with what. track: of the chair as given; the columns are differences from it.
+      nuisances: their columns, by name. columns: of effects and forces. starts: what the effects'
+        columns mean. pulses, answers: forces in time and what they change.
+      plain: the best chair without any effect.
+      fit: where the effects are screened from, with its system and reduced sums.
     """
 
     bench: Bench
-    fit: Fit
     track: Track
     nuisances: dict[str, Column]
     columns: dict[str, Column]
     starts: list[Start]
     pulses: list[Pulse]
     answers: list[Array]
+    plain: Fitted
+    fit: Fit
     system: System
     reduced: Reduced
 
@@ -87,10 +91,8 @@ def silent(_: str) -> None:
     """Say nothing."""
 
 
-def prepare(
-    study: Study, say: Say = silent, store: Store | None = None
-) -> tuple[Bench, Fit, Track]:
-    """Windows, noise and nuisances: a chair that is as right as it can be without any effect."""
+def prepare(study: Study, say: Say = silent, store: Store | None = None) -> tuple[Bench, Track]:
+    """Windows, their states, the noise, and what is only roughly known."""
     shooter = Shooter(study, store=store)
     found = noise.estimate(study)
     say("states along the runs")
@@ -100,53 +102,32 @@ def prepare(
     if any(begin.stops(run) for run in study.runs):  # at rest the accelerometer showed its bias
         given.setdefault("bias:imu_accelerometer.x", AT_REST)
     nuisances = nuisance.nuisances(study.channels, given)
-    bench = Bench(shooter, found, nuisances, Whitener(shooter, found))
-    say("what is only roughly known")
-    fit = Fit(nuisances)
-    for _ in range(2):
-        columns = nuisance_columns(bench, first, fit)
-        system = linear.build(
-            shooter, first, found, columns, len(columns), bench.whitener, fit.offsets
-        )
-        step = solve(system, bench.windows)
-        mechanical = {n.name for n in nuisances if n.edit is not None}
-        offsets = {
-            n: float(np.clip(fit.offsets.get(n, 0.0) + by, -2.0, 2.0))
-            for n, by in zip(system.names, step, strict=True)
-            if n in mechanical
-        }
-        moved = max((abs(offsets[n] - fit.offsets.get(n, 0.0)) for n in offsets), default=0.0)
-        fit = replace(fit, offsets=offsets)
-        first = track(shooter, shooter.compile(fit.edit), found, before=first)
-        if moved < 0.5:
-            break
-    return bench, fit, first
+    return Bench(shooter, found, nuisances, Whitener(shooter, found)), first
 
 
 def screen_columns(
-    bench: Bench, fit: Fit, found: Track, effects: Sequence[Effect], say: Say = silent
+    bench: Bench, found: Track, effects: Sequence[Effect], say: Say = silent
 ) -> Base:
-    """Every column around the prepared chair, and the linear algebra of them all."""
-    shooter = bench.shooter
+    """Every column around the chair as given, and the linear algebra of them all."""
+    shooter, given = bench.shooter, Fit(bench.nuisances)
+    say("what is only roughly known")
+    nuisances = nuisance_columns(bench, found, given)
+    plain = refit(bench, given, found, nuisances)
     say("answers to forces")
     pulses = sensitivity.pulses(shooter)
-    answers = sensitivity.pulse_columns(shooter, found, pulses, fit.edit)
-    nuisances = nuisance_columns(bench, found, fit)
+    answers = sensitivity.pulse_columns(shooter, found, pulses)
     columns, starts = candidates.collect(
-        bench, found, fit, effects, pulses, answers, lambda key: say(f"effect {key}")
+        bench, found, given, effects, pulses, answers, lambda key: say(f"effect {key}")
     )
     columns.update(force.driver_columns(bench, found, pulses, answers))
-    system = linear.build(
-        shooter,
-        found,
-        bench.noise,
-        {**nuisances, **columns},
-        len(nuisances),
-        bench.whitener,
-        fit.offsets,
-    )
+    # a nuisance far from its prior stands in for something else: then the chair as given is nearer
+    far = max((abs(v) for v in plain.fit.offsets.values()), default=0.0) > FAR
+    fit, here = (given, found) if far else (plain.fit, plain.track)
+    system = bench.system(here, {**nuisances, **columns}, len(nuisances), fit)
     reduced = linear.reduce(system, bench.windows)
-    return Base(bench, fit, found, nuisances, columns, starts, pulses, answers, system, reduced)
+    return Base(
+        bench, found, nuisances, columns, starts, pulses, answers, plain, fit, system, reduced
+    )
 
 
 def gap_after(base: Base, fitted: Fitted) -> tuple[Gap, System, Reduced]:
@@ -154,16 +135,10 @@ def gap_after(base: Base, fitted: Fitted) -> tuple[Gap, System, Reduced]:
     bench = base.bench
     count = len(fitted.columns)
     terms = count - len(base.nuisances)
-    system = linear.build(
-        bench.shooter,
-        fitted.track,
-        bench.noise,
-        {**fitted.columns, **base.columns},
-        count,
-        bench.whitener,
-        fitted.fit.offsets,
+    system = bench.system(
+        fitted.track, {**fitted.columns, **base.columns}, count, fitted.fit, free=terms
     )
-    reduced = linear.reduce(system, bench.windows, free=terms)
+    reduced = linear.reduce(system, bench.windows)
     keys = [t.effect.key for t in fitted.fit.terms]
     return gaps.test_gap(bench, system, reduced, keys), system, reduced
 
@@ -200,10 +175,10 @@ def diagnose(
 
 
 def _diagnose(known: Study, effects: Sequence[Effect], say: Say, store: Store | None) -> Diagnosis:
-    bench, fit, found = prepare(known, say, store)
-    base = screen_columns(bench, fit, found, study_effects(known, effects), say)
+    bench, found = prepare(known, say, store)
+    base = screen_columns(bench, found, study_effects(known, effects), say)
     say("the gap")
-    gap = gaps.test_gap(bench, base.system, base.reduced)
+    gap, _, _ = gap_after(base, base.plain)
     if not gap.exists:
         return _finish(base, gap, None, [], [], say)
     say("effects, one and two at a time")
@@ -243,7 +218,10 @@ def _choose(base: Base, gap: Gap, say: Say) -> tuple[Hypothesis | None, Fitted |
         if not left.exists:
             break
     assert best is not None
-    return best[0], best[1], after
+    say("the last fit, with everything made anew around it")
+    fitted = refit(base.bench, best[1].fit, best[1].track, rounds=1)
+    after[-1], _, _ = gap_after(base, fitted)
+    return best[0], fitted, after
 
 
 def _commonest(base: Base, options: Sequence[Hypothesis]) -> Hypothesis:
@@ -260,14 +238,9 @@ def _refit(base: Base, hypothesis: Hypothesis, say: Say) -> Fitted:
     return refit(base.bench, start, base.track, base.nuisances)
 
 
-def _plain(base: Base) -> float:
-    """Chi2 without any effect, nuisances fitted."""
-    step = linear.fit(base.system, base.bench.windows, [])
-    return float(sum(linear.chi2(base.system, int(i), step) for i in base.bench.windows))
-
-
 def _gain(base: Base, fitted: Fitted) -> float:
-    return _plain(base) - fitted.total
+    """Drop of chi2 that the effects bring."""
+    return base.plain.total - fitted.total
 
 
 def closure(gap: Gap, base: Base, fitted: Fitted, after: Gap) -> float:
@@ -468,7 +441,7 @@ def _held_windows(base: Base) -> NDArray[np.int64]:
 def _summary(base: Base, gap: Gap, fitted: Fitted | None, after: list[Gap]) -> dict[str, Any]:
     held = _held_windows(base)
     windows = held if held.size else base.bench.windows
-    before, dof = _slow(base.system, windows)
+    before, dof = _slow(base.plain.system, windows)
     left = _slow(fitted.system, windows)[0] if fitted is not None else before
     who = "held-out trials" if held.size else "all trials, since none is held out"
     return {

@@ -48,7 +48,7 @@ def fitted_fit(diagnosis: Diagnosis) -> Any:
 def where(diagnosis: Diagnosis) -> Figure:
     """Residual over noise, channel by window, before and after."""
     base, fitted = diagnosis.stages["base"], fitted_fit(diagnosis)
-    systems = [("as it was", base.system)]
+    systems = [("as it was", base.plain.system)]
     if fitted is not None:
         systems.append(("corrected", fitted.system))
     shooter = base.bench.shooter
@@ -186,7 +186,7 @@ def gap(diagnosis: Diagnosis) -> Figure:
     figure = Figure(figsize=(9.4, 0.3 * len(runs) + 1.2), layout="constrained")
     ax = figure.subplots()
     names = [r.trial.name + (" (held out)" if r.hold_out else "") for r in runs]
-    before = _by_run(base.system, len(runs))
+    before = _by_run(base.plain.system, len(runs))
     at = np.arange(len(runs))
     ax.axvline(1.0, color="0.4", ls=":", lw=1.2, label="noise floor")
     if fitted is not None:
@@ -223,11 +223,11 @@ def compared(diagnosis: Diagnosis) -> Figure:
     shooter = base.bench.shooter
     chosen = _runs_shown(shooter)
     whole = Shooter(shooter.study, [_whole(shooter, i) for i in chosen])
-    plain = Fit(base.fit.nuisances)
+    plain = Fit(base.plain.fit.nuisances)
     old = _rolled(whole, shooter, plain, base.track)
     new: list[Array | None] = [None] * len(chosen)
     if fitted is not None:
-        fit = Fit(base.fit.nuisances, {}, fitted.fit.terms)
+        fit = Fit(base.plain.fit.nuisances, {}, fitted.fit.terms)
         new = [*_rolled(whole, shooter, fit, fitted.track)]
     figure = Figure(figsize=(9.4, 2.3 * len(chosen) + 0.6), layout="constrained")
     axes = figure.subplots(len(chosen), 2, squeeze=False)

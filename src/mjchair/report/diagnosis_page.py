@@ -309,7 +309,7 @@ def _next(diagnosis: Diagnosis) -> list[str]:
 
 def _assumed(diagnosis: Diagnosis) -> list[str]:
     base, fitted = diagnosis.stages["base"], diagnosis_figures.fitted_fit(diagnosis)
-    offsets = base.fit.offsets if fitted is None else fitted.fit.offsets
+    offsets = base.plain.fit.offsets if fitted is None else fitted.fit.offsets
     moved = [
         (
             html.escape(n.name.replace("_", " ")),
