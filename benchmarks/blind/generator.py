@@ -61,7 +61,7 @@ def _pushes(t: float) -> tuple[float, float]:
 
 
 def _slalom(t: float) -> tuple[float, float]:
-    swing = 16.0 * np.sin(2 * np.pi * (0.35 * t + 0.04 * t * t))  # 0.35 to 0.85 Hz
+    swing = 11.0 * np.sin(2 * np.pi * (0.35 * t + 0.04 * t * t))  # 0.35 to 0.85 Hz
     return 2.5 + swing, 2.5 - swing
 
 
@@ -368,13 +368,14 @@ def make(
     trials: int = 6,
     seconds: float = 6.0,
     channels: tuple[str, ...] | None = None,
+    held: int | None = None,
 ) -> None:
-    """Write a study and its sealed answer."""
+    """Write a study and its sealed answer; trial `held` is held out."""
     folder.mkdir(parents=True, exist_ok=True)
     which = _chosen(trials)
     chosen = [MANOEUVRES[k] for k in which]
     if case.kind in ("one", "two", "outside") and case.sigma:
-        _size(case, seed, which, seconds)
+        _size(case, seed, tuple(t for k, t in enumerate(which) if k != held), seconds)
     rng = np.random.default_rng([seed, 1])
     world = World(np.random.default_rng([seed, 2]), case.hidden)
     lines = ['model = "manual"', 'scene = "flat"', "", "[noise]"]
@@ -389,6 +390,7 @@ def make(
         file = f"{man.name}_{k}.csv"
         _write(folder / file, table)
         lines += ["", "[[trial]]", f'file = "{file}"', f'manoeuvre = "{man.name}"']
+        lines += ["hold_out = true"] if k == held else []
     (folder / "study.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
     seal(folder / SEAL, case)
 
@@ -470,20 +472,20 @@ ROUGHLY = {  # what a study knows only roughly: standard deviations, as the docu
 
 
 @lru_cache
-def roughly(trials: tuple[int, ...], seconds: float) -> np.ndarray:
-    """What one standard deviation of each roughly known number changes, (n, numbers)."""
-    chosen = [MANOEUVRES[k] for k in trials]
-    plain = [run(World(None, {}), man, seconds)[0] for man in chosen]
+def roughly(trial: int, seconds: float) -> np.ndarray:
+    """What one standard deviation of each roughly known number changes in a run, (n, numbers)."""
+    man = MANOEUVRES[trial]
+    plain = run(World(None, {}), man, seconds)[0]
     columns = []
     for name, std in ROUGHLY.items():
         if name.startswith("bias."):
             channel = name.removeprefix("bias.")
-            moved = [dict(e, **{channel: e[channel] + std}) for e in plain]
+            moved = dict(plain, **{channel: plain[channel] + std})
         else:
             world = World(None, {})
             world.change(name, std)
-            moved = [run(world, man, seconds)[0] for man in chosen]
-        columns.append(apart(moved, plain))
+            moved = run(world, man, seconds)[0]
+        columns.append(apart([moved], [plain]))
     return np.column_stack(columns)
 
 
@@ -502,7 +504,7 @@ def _size(case: Case, seed: int, trials: tuple[int, ...], seconds: float) -> Non
     chosen = [MANOEUVRES[k] for k in trials]
     plain = World(np.random.default_rng([seed, 2]), {})
     without = [run(plain, man, seconds)[0] for man in chosen]
-    known = roughly(trials, seconds)
+    known = np.vstack([roughly(k, seconds) for k in trials])
     for name in case.hidden:
         for attempt in range(4):
             if name.startswith("sensor"):

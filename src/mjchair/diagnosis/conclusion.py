@@ -65,7 +65,7 @@ def _verdict(base: Base, gap: Gap, choice: Choice | None, closed: float) -> str:
     if choice is None or closed < CLOSES or held_out_gain(base, choice.fitted) < HELD:
         return UNKNOWN
     sure = (
-        all(s > SIGMAS for s in _sigmas(choice.fitted))
+        all(s > SIGMAS for s in choice.fitted.sigmas.values())
         and not choice.fitted.at_bound
         and held_out_gain(base, choice.fitted, "manoeuvre") > 0.0
     )
@@ -83,21 +83,6 @@ def _alternatives(choice: Choice) -> list[list[str]]:
         names = list(dict.fromkeys([start.effect.name, *new]))
         if len(names) > 1:
             out.append(names)
-    return out
-
-
-def _sigmas(fitted: Fitted) -> list[float]:
-    """The largest significance among each effect's parameters."""
-    out = []
-    for term in fitted.fit.terms:
-        values = []
-        for name in term.free:
-            p = term.effect.parameter(name)
-            std = fitted.std[f"{term.effect.key}.{name}"]
-            if term.effect.tags and name in ("phase", "frequency", "x", "y", "radius"):
-                continue
-            values.append(abs(term.values[name] - p.neutral) / max(std, 1e-12))
-        out.append(max(values, default=0.0))
     return out
 
 

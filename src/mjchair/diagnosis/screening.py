@@ -22,20 +22,20 @@ from mjchair.diagnosis.tracking import Track, track
 from mjchair.effects.effect import Effect
 
 Say = Callable[[str], None]
-FAR = 1.5  # prior standard deviations: a nuisance there is not what moved
+FAR = 2.5  # prior standard deviations: a nuisance there is not what moved
 AT_REST = 0.01  # m/s^2, bias of an accelerometer that was seen at rest
 
 
 @dataclass
 class Base:
-    """The study's chair with every column around it.
+    """A chair without any effect, and every column around it.
 
     Attributes:
-      bench: with what. track: of the chair as given; the columns are differences from it.
+      bench: with what. plain: the best such chair.
+      fit, track: where effects are screened from: that chair, or the chair as given.
       nuisances: their columns, by name. columns: of effects and forces. starts: what the effects'
         columns mean. pulses, answers: forces in time and what they change.
-      plain: the best chair without any effect.
-      fit: where the effects are screened from, with its system and reduced sums.
+      system, reduced: the linear algebra of them all.
     """
 
     bench: Bench
@@ -72,25 +72,25 @@ def prepare(study: Study, say: Say = silent, store: Store | None = None) -> tupl
 def screen_columns(
     bench: Bench, found: Track, effects: Sequence[Effect], say: Say = silent
 ) -> Base:
-    """Every column around the chair as given, and the linear algebra of them all."""
+    """Every column around a chair without effects, and the linear algebra of them all."""
     shooter, given = bench.shooter, Fit(bench.nuisances)
     say("what is only roughly known")
-    nuisances = nuisance_columns(bench, found, given)
-    plain = refit(bench, given, found, nuisances)
+    plain = refit(bench, given, found)
+    fit, here, nuisances = plain.fit, plain.track, plain.columns
+    # a nuisance far from its prior stands in for something else: then the chair as given is nearer
+    if max((abs(v) for v in fit.offsets.values()), default=0.0) > FAR:
+        fit, here, nuisances = given, found, nuisance_columns(bench, found, given)
     say("answers to forces")
     pulses = sensitivity.pulses(shooter)
-    answers = sensitivity.pulse_columns(shooter, found, pulses)
+    answers = sensitivity.pulse_columns(shooter, here, pulses, fit.edit)
     columns, starts = candidates.collect(
-        bench, found, given, effects, pulses, answers, lambda key: say(f"effect {key}")
+        bench, here, fit, effects, pulses, answers, lambda key: say(f"effect {key}")
     )
-    columns.update(force.driver_columns(bench, found, pulses, answers))
-    # a nuisance far from its prior stands in for something else: then the chair as given is nearer
-    far = max((abs(v) for v in plain.fit.offsets.values()), default=0.0) > FAR
-    fit, here = (given, found) if far else (plain.fit, plain.track)
+    columns.update(force.driver_columns(bench, here, pulses, answers))
     system = bench.system(here, {**nuisances, **columns}, len(nuisances), fit)
     reduced = linear.reduce(system, bench.windows)
     return Base(
-        bench, found, nuisances, columns, starts, pulses, answers, plain, fit, system, reduced
+        bench, here, nuisances, columns, starts, pulses, answers, plain, fit, system, reduced
     )
 
 
