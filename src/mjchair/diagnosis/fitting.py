@@ -212,8 +212,13 @@ def refit(
     Args:
       start: where to begin. before: a track of a chair that is not far.
       nuisances: columns to use throughout, with the answers to the slow state of `before`; None:
-        made anew in every round. The residual, which decides where the fit ends, is always new.
+        both are made anew at `start`. The residual, which decides where the fit ends, is always
+        new.
     """
+    if nuisances is None:
+        model, seen = bench.shooter.compile(start.edit), start.observer(bench.shooter.channels)
+        before = track(bench.shooter, model, bench.noise, seen, before, anew=True)
+        nuisances = nuisance_columns(bench, before, start)
     best = _around(bench, start, before, nuisances)
     fit = _moved(bench, best)
     for _ in range(rounds):
@@ -231,14 +236,14 @@ def _around(
     bench: Bench,
     fit: Fit,
     before: Track | None,
-    nuisances: dict[str, Column] | None,
+    nuisances: dict[str, Column],
 ) -> Fitted:
     """A chair as it is, and the linear system around it."""
     shooter = bench.shooter
     seen = fit.observer(shooter.channels)
     model = shooter.compile(fit.edit)
-    found = track(shooter, model, bench.noise, seen, before, anew=nuisances is None)
-    columns = dict(nuisances or nuisance_columns(bench, found, fit))
+    found = track(shooter, model, bench.noise, seen, before)
+    columns = dict(nuisances)
     count = len(columns)
     columns.update(term_columns(bench, found, fit))
     system = bench.system(found, columns, count, fit)

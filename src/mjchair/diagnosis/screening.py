@@ -22,6 +22,7 @@ from mjchair.diagnosis.tracking import Track, track
 from mjchair.effects.effect import Effect
 
 Say = Callable[[str], None]
+NEAR = 0.5  # prior standard deviations that columns of nuisances are good for
 FAR = 2.5  # prior standard deviations: a nuisance there is not what moved
 AT_REST = 0.01  # m/s^2, bias of an accelerometer that was seen at rest
 
@@ -75,11 +76,14 @@ def screen_columns(
     """Every column around a chair without effects, and the linear algebra of them all."""
     shooter, given = bench.shooter, Fit(bench.nuisances)
     say("what is only roughly known")
-    plain = refit(bench, given, found)
-    fit, here, nuisances = plain.fit, plain.track, plain.columns
+    nuisances = nuisance_columns(bench, found, given)
+    plain = refit(bench, given, found, nuisances)
+    if _farthest(plain) > NEAR:
+        plain = refit(bench, plain.fit, plain.track)
+    fit, here = given, found
     # a nuisance far from its prior stands in for something else: then the chair as given is nearer
-    if max((abs(v) for v in fit.offsets.values()), default=0.0) > FAR:
-        fit, here, nuisances = given, found, nuisance_columns(bench, found, given)
+    if _farthest(plain) < FAR:
+        fit, here, nuisances = plain.fit, plain.track, plain.columns
     say("answers to forces")
     pulses = sensitivity.pulses(shooter)
     answers = sensitivity.pulse_columns(shooter, here, pulses, fit.edit)
@@ -92,6 +96,10 @@ def screen_columns(
     return Base(
         bench, here, nuisances, columns, starts, pulses, answers, plain, fit, system, reduced
     )
+
+
+def _farthest(plain: Fitted) -> float:
+    return max((abs(v) for v in plain.fit.offsets.values()), default=0.0)
 
 
 def gap_after(base: Base, fitted: Fitted) -> tuple[Gap, System, Reduced]:

@@ -78,7 +78,7 @@ def choose(base: Base, gap: Gap, say: Say) -> Choice | None:
     hypothesis, fitted = _dropped(base, *best, say)
     rivals = _rivals(base, hypothesis, fitted, say)
     say("the last fit, with everything made anew around it")
-    fitted = refit(base.bench, fitted.fit, fitted.track, rounds=2)
+    fitted = refit(base.bench, fitted.fit, fitted.track)
     after[-1] = gap_after(base, fitted)[0]
     return Choice(hypothesis, fitted, after, rivals)
 

@@ -22,7 +22,7 @@ from mjchair.simulation import names
 from mjchair.simulation.initial import start
 
 Array = NDArray[np.float64]
-ROUNDS, KEPT_ROUNDS = 2, 3  # Gauss-Newton rounds a window; where its columns are known already
+ROUNDS = 2  # Gauss-Newton rounds a window
 
 
 @dataclass
@@ -122,7 +122,7 @@ def track(
                 elif states[i] is None:
                     states[i] = firsts[w.run].copy()
             search = {i: Search(_some(states[i])) for i in members}
-            for _ in range(KEPT_ROUNDS if kept else ROUNDS):
+            for _ in range(ROUNDS):
                 _fit_round(
                     shooter, chair, (model, coarse), observer, search, white, predicted, slow, kept
                 )
