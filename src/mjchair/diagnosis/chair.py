@@ -9,8 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.simulation import names
+from mjchair.simulation.initial import Initial, start
 
 Array = NDArray[np.float64]
+
+Rest = tuple[float, Array]  # height of the chair's joint (m) and its attitude (quaternion)
 
 # the slow state: what a window may start from. Everything else (sinking, pitching, tire
 # deflections, wheel spin) settles on it within the lead of a window.
@@ -63,6 +66,27 @@ class Chair:
         chair = model.body(model.jnt_bodyid[names.find("chair", names.joints(model), "joint")]).id
         local = data.xmat[chair].reshape(3, 3).T @ (data.geom_xpos[geom] - data.xpos[chair])
         return int(model.jnt_dofadr[joint]), float(model.geom_size[geom, 0]), float(local[1])
+
+    def statics(self, model: mujoco.MjModel) -> bytes:
+        """What decides how a model rests on its tires."""
+        parts = ("geom_size", "geom_pos", "body_pos", "body_quat", "body_mass", "body_ipos")
+        return b"".join(getattr(model, name).tobytes() for name in parts)
+
+    def rest(self, model: mujoco.MjModel) -> Rest:
+        """How a model rests on the level; the tire callbacks must be in place."""
+        qpos = start(model, Initial()).qpos
+        return float(qpos[self.qpos + 2]), qpos[self.qpos + 3 : self.qpos + 7].copy()
+
+    def lowered(self, state: State, here: Rest, there: Rest) -> State:
+        """A state that rests like `here`, resting like `there`."""
+        out = state.copy()
+        out.qpos[self.qpos + 2] += there[0] - here[0]
+        back, turn = np.zeros(4), np.zeros(4)
+        mujoco.mju_negQuat(back, here[1])
+        mujoco.mju_mulQuat(turn, back, there[1])
+        at = slice(self.qpos + 3, self.qpos + 7)
+        mujoco.mju_mulQuat(out.qpos[at], state.qpos[at].copy(), turn)
+        return out
 
     def stands(self, state: State) -> bool:
         """Whether the chair stands on its tires, within what a window can tell."""

@@ -12,7 +12,7 @@ from mujoco import batch
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
-from mjchair.diagnosis.chair import Chair, State
+from mjchair.diagnosis.chair import Chair, Rest, State
 from mjchair.diagnosis.store import Store
 from mjchair.diagnosis.study import Run, Study
 from mjchair.diagnosis.windows import Window, cut
@@ -83,6 +83,7 @@ class Shooter:
         self.steps = int(np.ceil(longest / self.step)) + 3
         self.coarse = self._coarse_step()
         self._places: dict[int, list[int]] = {}
+        self._rests: dict[bytes, Rest] = {}
         self.motions = [_motion(run) for run in study.runs]
 
     def _coarse_step(self) -> float:
@@ -207,8 +208,27 @@ class Shooter:
         same = (model.nq, model.nv, model.na) == (self.base.nq, self.base.nv, self.base.na)
         for i, job in enumerate(jobs):
             time[i] = job.window.start
-            state = job.state if same else self._fitted_to(model, job)
+            state = self.resting(job.state, job.model) if same else self._fitted_to(model, job)
             qpos[i], qvel[i], act[i] = state.qpos, state.qvel, state.act
+
+    def resting(self, state: State, model: mujoco.MjModel, back: bool = False) -> State:
+        """A state of the base model as this model rests on its tires; or `back` again.
+
+        A wheel 3 mm smaller would otherwise begin every window with a fall of 3 mm.
+        """
+        if len(state.qpos) != self.base.nq:
+            return state
+        rests = [self._rest(m) for m in (self.base, model)]
+        if rests[0] is rests[1]:
+            return state
+        return self.chair.lowered(state, *(rests[::-1] if back else rests))
+
+    def _rest(self, model: mujoco.MjModel) -> Rest:
+        key = self.chair.statics(model)
+        if key not in self._rests:
+            with installed():
+                self._rests[key] = self.chair.rest(model)
+        return self._rests[key]
 
     def _fitted_to(self, model: mujoco.MjModel, job: Job) -> State:
         """The base state in a model with more joints or activations."""

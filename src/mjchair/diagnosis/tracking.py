@@ -269,7 +269,7 @@ def _hand_over(
     base = shooter.base
     full = State(trace["qpos"][at].copy(), trace["qvel"][at].copy(), trace["act"][at].copy())
     if (model.nq, model.nv, model.na) == (base.nq, base.nv, base.na):
-        states[following[0]] = full
+        states[following[0]] = shooter.resting(full, model, back=True)
         return
     out = State(base.qpos0.copy(), np.zeros(base.nv), np.zeros(base.na))
     for j, name in enumerate(names.joints(base)):
