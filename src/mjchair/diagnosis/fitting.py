@@ -139,12 +139,9 @@ def term_columns(bench: Bench, found: Track, fit: Fit) -> dict[str, Column]:
                     bench.shooter, found, term.effect.name, str(term.effect.channel), size
                 )
                 continue
-            share = 0.25 * size
-            p = term.effect.parameter(name)
-            if not p.low <= term.values[name] + share <= p.high:
-                share = -share
+            beside, factor = nudged(fit, term, name)
             names.append(key)
-            points.append(Point(_shifted(fit, term, name, share), size / share))
+            points.append(Point(beside.edit, factor))
     if points:
         # a point here is a whole chair, so nothing comes before its edit
         base = sensitivity.predictions(
@@ -166,10 +163,16 @@ def change(effect: Effect, name: str) -> float:
     return {"Hz": 0.05, "rad": 0.3}.get(p.unit, 0.1)
 
 
-def _shifted(fit: Fit, term: Term, name: str, by: float):  # type: ignore[no-untyped-def]
-    values = {**term.values, name: term.values[name] + by}
+def nudged(fit: Fit, term: Term, name: str) -> tuple[Fit, float]:
+    """A fit with one parameter a little aside, and its typical change over that little."""
+    size = change(term.effect, name)
+    share = 0.25 * size
+    p = term.effect.parameter(name)
+    if not p.low <= term.values[name] + share <= p.high:
+        share = -share
+    values = {**term.values, name: term.values[name] + share}
     terms = tuple(Term(t.effect, values, t.free) if t is term else t for t in fit.terms)
-    return Fit(fit.nuisances, fit.offsets, terms).edit
+    return Fit(fit.nuisances, fit.offsets, terms), size / share
 
 
 @dataclass
@@ -223,11 +226,11 @@ def refit(
         spread = linear.spread(system, bench.windows)
         if turn == rounds:
             break
-        moved = _moved(fit, system, step)
+        ahead = moved(fit, system, step)
         small = np.abs(step[count:]) < 0.02 * np.maximum(spread[count:], 1e-9)
         if turn and small.size and small.all():
             break
-        fit = moved
+        fit = ahead
     chi2 = np.array([linear.chi2(system, i, step) for i in bench.windows])
     std, bound = {}, []
     for k, key in enumerate(system.names[count:]):
@@ -245,7 +248,8 @@ def _term(fit: Fit, key: str) -> tuple[Term, str]:
     return next(t for t in fit.terms if t.effect.key == effect), name
 
 
-def _moved(fit: Fit, system: System, step: Array) -> Fit:
+def moved(fit: Fit, system: System, step: Array) -> Fit:
+    """The fit after a step (p,) of the system's coefficients, within walls and bounds."""
     offsets = dict(fit.offsets)
     mechanical = {n.name for n in fit.nuisances if n.edit is not None}
     for name, by in zip(system.names[: system.nuisance], step, strict=False):

@@ -14,8 +14,10 @@ from scipy import stats
 from threadpoolctl import threadpool_limits
 
 from mjchair.diagnosis import (
+    advice,
     begin,
     candidates,
+    experiments,
     force,
     linear,
     noise,
@@ -25,7 +27,6 @@ from mjchair.diagnosis import (
 )
 from mjchair.diagnosis import gap as gaps
 from mjchair.diagnosis.candidates import Start
-from mjchair.diagnosis.experiments import suggest
 from mjchair.diagnosis.fitting import Bench, Fit, Fitted, nuisance_columns, refit
 from mjchair.diagnosis.gap import Gap
 from mjchair.diagnosis.linear import Reduced, System, Whitener
@@ -343,16 +344,16 @@ def _finish(
             names = dict.fromkeys([start.effect.name, *(k.split(":")[0] for k in new)])
             if len(names) > 1:
                 alternatives.append(list(names))
-    advice = ""
-    if verdict == AMBIGUOUS and chosen is not None and fitted is not None:
-        advice = suggest(name for group in alternatives for name in group)
+    planned = None
+    following = ""
+    if verdict == AMBIGUOUS and fitted is not None:
+        say("the next experiment")
+        planned = experiments.plan(base.bench, fitted, _others(base, rivals, say))
+        following = advice.deciding(planned, base.bench.shooter)
     elif verdict == UNKNOWN:
-        advice = (
-            "Repeat the run with the largest gap without changes: what comes back at the same "
-            "place, time or wheel angle tells what it is tied to."
-        )
+        following = advice.searching(_drivers(after[-1] if after else gap))
     stages = {"base": base, "gap": gap, "fitted": fitted, "after": after, "chosen": chosen,
-              "rivals": rivals}  # fmt: skip
+              "rivals": rivals, "experiments": planned}  # fmt: skip
     return Diagnosis(
         verdict,
         effects if verdict != UNKNOWN else [],
@@ -360,11 +361,17 @@ def _finish(
         ranked,
         _summary(base, gap, fitted, after),
         _where(base, gap),
-        advice,
+        following,
         _notes(base, gap, fitted, closed, verdict),
         _drivers(after[-1] if after else gap),
         stages,
     )
+
+
+def _others(base: Base, rivals: list[list[Hypothesis]], say: Say) -> list[Fitted]:
+    """What the next experiment is to rule out: the rivals, or else that there is no effect."""
+    near = [h for group in rivals for h in group[:RIVALS]]
+    return [_refit(base, h, say) for h in near] or [base.plain]
 
 
 def _sigmas(fitted: Fitted) -> list[float]:
