@@ -135,7 +135,7 @@ def distinct(fit: Fit, other: Fit) -> str:
     """Names of the effects of a fit that the other does not have."""
     theirs = {t.effect.key for t in other.terms}
     mine = [t.effect.key for t in fit.terms if t.effect.key not in theirs]
-    return " and ".join(mine) or "nothing further"
+    return " and ".join(mine) or "no further effect"
 
 
 def nuisance_answers(rehearsal: Rehearsal, chosen: Fitted) -> dict[str, Column]:
