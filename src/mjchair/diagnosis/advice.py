@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mjchair.diagnosis.experiments import Evidence, Plan
+from mjchair.diagnosis.experiments import PLENTY, Evidence, Plan
 from mjchair.diagnosis.shooting import Shooter
 from mjchair.model.wheels import base_name
 from mjchair.simulation.channels import channels
 
 ENOUGH = 3.0  # sigmas that decide
-CLOSE = 0.7  # of the best T, that is nearly as good
+CLOSE = 0.7  # of the best T, that is worth a word
 OFTEN = 20  # repetitions beyond which nobody would
 MOST = 30.0  # sigmas, beyond which the number says nothing more
 
@@ -30,8 +30,9 @@ def deciding(plan: Plan, shooter: Shooter) -> str:
         if evidence.noises > 1.0:
             said.append(_evidence(evidence, chosen, rival, units[evidence.channel]))
     said += _again(best.least)
-    others = [e for e in plan.experiments[1:2] if e.least > max(CLOSE * best.least, 1.0)]
-    said += [f"Nearly as good: {_lower(e.manoeuvre.words)} ({_sigmas(e.least)})." for e in others]
+    near = max(CLOSE * min(best.least, PLENTY), 1.0)
+    others = [e for e in plan.experiments[1:2] if e.least > near]
+    said += [f"Or {_lower(e.manoeuvre.words)} ({_sigmas(e.least)})." for e in others]
     return " ".join(said)
 
 

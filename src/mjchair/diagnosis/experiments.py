@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 # effects that every chair has a little of, and that only turning shows
 DOUBTS = (turning_scrub.EFFECT, caster_friction.EFFECT)
 SMOOTH = 0.5  # s, over which a person would average a channel
+# chi2, ten sigmas: T is linear, and above this a simple manoeuvre is worth more than a larger T
+PLENTY = 100.0
 PHASE = math.pi / math.sqrt(3.0)  # rad, standard deviation of a phase that starts anew each run
 
 
@@ -87,7 +89,7 @@ class Plan:
 
     @property
     def best(self) -> Experiment:
-        """The manoeuvre whose smallest T is largest."""
+        """The manoeuvre whose smallest T is largest, or the simplest of those with plenty."""
         return self.experiments[0]
 
 
@@ -100,9 +102,11 @@ def plan(
 ) -> Plan:
     """Rehearse the manoeuvres and rank them by the smallest T over the rivals.
 
+    Of those that separate by PLENTY, the one that stands first is taken, as the simplest.
+
     Args:
       bench: of the study. chosen: the chair that is rehearsed. rivals: at least one, each a fit.
-      manoeuvres: to choose from; None: all of the library that this lab can make.
+      manoeuvres: to choose from, simplest first; None: all of the library that this lab can make.
       doubts: effects that may be there besides, at their typical size.
     """
     here = setting(bench.shooter.study)
@@ -116,7 +120,7 @@ def plan(
         Experiment(m, tuple(float(s.least[i]) for s in separated))
         for i, m in enumerate(rehearsal.manoeuvres)
     ]
-    order = sorted(range(len(found)), key=lambda i: -found[i].least)
+    order = sorted(range(len(found)), key=lambda i: (-min(found[i].least, PLENTY), i))
     best = order[0]
     evidence = [
         _evidence(rehearsal, bench, best, version(chosen), version(rival, s.steps[best]))

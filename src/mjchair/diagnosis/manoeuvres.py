@@ -137,7 +137,8 @@ def _circle(time: Array) -> tuple[Array, Array]:
 
 
 _SEAT = f" with {LOAD:g} kg more on the seat, strapped down above the axle"
-LIBRARY = (
+LIBRARY = (  # simplest first
+    Manoeuvre("stand", "Let it stand with everything recording, brakes off, hands off"),
     Manoeuvre("coast", "Coast as before, from 1.8 m/s, hands off the wheels", COAST),
     Manoeuvre(
         "coast reversed",
@@ -154,7 +155,6 @@ LIBRARY = (
     Manoeuvre("coast in a left turn", "Coast from 1.3 m/s in a turn to the left", 1.3, 0.0, 0.6),
     Manoeuvre("coast in a right turn", "Coast from 1.3 m/s in a turn to the right", 1.3, 0.0, -0.6),
     Manoeuvre("coast a metre aside", "Coast with the start moved by 1 m", COAST, shift=(0.0, 1.0)),
-    Manoeuvre("stand", "Let it stand with everything recording, brakes off, hands off"),
     Manoeuvre("free spin", "Turn it on the spot at about 1.5 rad/s and let go", yaw_rate=1.5),
     Manoeuvre("pushes", "Push it straight with even strokes from 0.8 m/s", 0.8, torque=_strokes),
     Manoeuvre("slow slalom", "Drive a slalom, 4 s a wave", 1.0, torque=_slalom(0.25)),
