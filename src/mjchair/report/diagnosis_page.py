@@ -323,9 +323,10 @@ def _experiments(plan: Plan) -> list[str]:
     ]
     return [
         _table(head, rows, [k == 0 for k in range(len(rows))]),
-        f'<p class="note">{len(rows)} of {len(plan.experiments)} manoeuvres, best first, and simplest '
-        "first above 10 sigmas, simulated with the corrected chair: how far each explanation would fall behind, after everything that "
-        "is only roughly known and its own parameters have done their best.</p>",
+        f'<p class="note">{len(rows)} of {len(plan.experiments)} manoeuvres, best first, and '
+        "simplest first above 10 sigmas, simulated with the corrected chair: how far each "
+        "explanation would fall behind, after everything that is only roughly known and its own "
+        "parameters have done their best.</p>",
     ]
 
 
