@@ -279,7 +279,9 @@ def _add(system: System, rehearsal: Rehearsal, theirs: Column, columns: dict[str
         nothing = np.zeros_like(miss)
         J = np.stack([columns[n][i] if n in columns else nothing for n in names], axis=2)
         slow, precision = linear.slow_columns(shooter, rehearsal.track, i)
-        white = rehearsal.whitener(i, np.concatenate([miss[:, :, None], J, slow], axis=2))
+        seen = np.concatenate([miss[:, :, None], J, slow], axis=2)
+        # what a chair that falls over shows separates nothing
+        white = rehearsal.whitener(i, np.nan_to_num(seen, posinf=0.0, neginf=0.0))
         r, J, Z = white[:, 0], white[:, 1 : 1 + p], white[:, 1 + p :]
         Gi, bi, ci, _ = linear.eliminated(r, J, Z, precision)
         G[w.run] += Gi

@@ -82,7 +82,7 @@ class Rehearsal:
         self.first = self._starts(chair)
         traces = self._open_loop(chair, self.first)
         again = self._nudged(chair)
-        whole = [i for i in range(len(traces)) if self._possible(traces[i], again[i])]
+        whole = [i for i in range(len(traces)) if self._possible(traces[i], again[i])] or [0]
         if len(whole) < len(traces):
             self.manoeuvres = [self.manoeuvres[i] for i in whole]
             self.first = [self.first[i] for i in whole]
