@@ -31,7 +31,7 @@ def parameters(name: str, rng: np.random.Generator) -> dict[str, float]:
         "mass_offset": {"x": 0.03} if sign > 0 else {"y": 0.02},
         "payload": {"mass": 10.0, "height": float(rng.uniform(0.4, 1.0))},
         "wheel_radius": {"left": 0.003 * sign},
-        "cornering_stiffness": {"rear": -0.3} if sign > 0 else {"front": -0.3},
+        "cornering_stiffness": {"rear": 0.3 * sign},
         "load_sensitivity": {"exponent": 0.25},
         "tire_friction": {"factor": 0.2},
         "relaxation_length": {"length": 0.15},

@@ -13,6 +13,7 @@ import csv
 import json
 import zlib
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 import mujoco
@@ -60,8 +61,13 @@ def _pushes(t: float) -> tuple[float, float]:
 
 
 def _slalom(t: float) -> tuple[float, float]:
-    swing = 5.0 * np.sin(2 * np.pi * 0.4 * t)
-    return 1.8 + swing, 1.8 - swing
+    swing = 11.0 * np.sin(2 * np.pi * (0.35 * t + 0.04 * t * t))  # 0.35 to 0.85 Hz
+    return 2.5 + swing, 2.5 - swing
+
+
+def _circle(t: float) -> tuple[float, float]:
+    more = 9.0 * np.tanh(t / 0.4)
+    return 3.0 - more, 3.0 + more
 
 
 def _stop_and_go(t: float) -> tuple[float, float]:
@@ -74,28 +80,34 @@ def _stop_and_go(t: float) -> tuple[float, float]:
 MANOEUVRES = (
     Manoeuvre("coast", 0.0, 1.8),
     Manoeuvre("coast", np.pi, 1.4, position=(6.0, 0.2)),
-    Manoeuvre("turn", 0.5, 1.3, 0.55),
+    Manoeuvre("turn", 0.5, 1.7, 0.0, _circle),
     Manoeuvre("push", 1.2, 0.8, 0.0, _pushes),
-    Manoeuvre("slalom", -0.6, 1.1, 0.0, _slalom),
+    Manoeuvre("slalom", -0.6, 1.8, 0.0, _slalom),
     Manoeuvre("start", 2.4, 0.0, 0.0, _stop_and_go),
 )
 
 
 @dataclass
 class Case:
-    """What is hidden: kind is none, one, two or outside; hidden maps names to parameters."""
+    """What is hidden: kind is none, one, two or outside; hidden maps names to parameters.
+
+    sigma is what each is to show at, reached what it shows at (beside what is roughly known).
+    """
 
     kind: str
     hidden: dict[str, dict[str, float]] = field(default_factory=dict)
     sigma: float = 0.0
     channel: str = ""
+    reached: dict[str, float] = field(default_factory=dict)
 
 
 class World:
     """A chair with something hidden in it, stepped by this file."""
 
-    def __init__(self, rng: np.random.Generator, hidden: dict[str, dict[str, float]]) -> None:
-        """Perturb what is roughly known, then hide the effects."""
+    def __init__(
+        self, rng: np.random.Generator | None, hidden: dict[str, dict[str, float]]
+    ) -> None:
+        """Perturb what is roughly known (None: not at all), then hide the effects."""
         self.hidden = hidden
         self.forces = [n for n in hidden if hasattr(self, f"_force_{n}")]
         spec = mjchair.load_spec()
@@ -109,7 +121,8 @@ class World:
         self.chair = m.body("chair").id
         self.dof = {j: int(m.joint(j).dofadr[0]) for j in (*WHEELS, *SWIVELS)}
         self.tire = {w: m.geom(f"{w}_tire").id for w in WHEELS}
-        self._perturb(rng)
+        if rng is not None:
+            self._perturb(rng)
         for name, values in hidden.items():
             edit = getattr(self, f"_edit_{name}", None)
             if edit is not None:
@@ -123,9 +136,24 @@ class World:
         m.body_inertia[c] *= factor * (1.0 + 0.05 * rng.standard_normal())
         m.body_ipos[c] += rng.standard_normal(3) * [0.006, 0.001, 0.012]
         for pair in (WHEELS[:2], WHEELS[2:]):
-            stiff = 1.0 + 0.04 * rng.standard_normal()
-            for w in pair:
-                m.geom_user[self.tire[w], COEFFICIENTS + 3] *= stiff  # a3 of PAC89
+            self._stiffen(pair, 1.0 + 0.04 * rng.standard_normal())
+
+    def _stiffen(self, wheels: tuple[str, ...], factor: float) -> None:
+        for w in wheels:
+            self.m.geom_user[self.tire[w], COEFFICIENTS + 3] *= factor  # a3 of PAC89
+
+    def change(self, name: str, by: float) -> None:
+        """Change one of what is ROUGHLY known."""
+        m, c = self.m, self.chair
+        if name == "mass":
+            m.body_mass[c] *= 1.0 + by
+        if name in ("mass", "inertia"):
+            m.body_inertia[c] *= 1.0 + by
+        elif name.startswith("ipos"):
+            m.body_ipos[c, int(name[-1])] += by
+        else:
+            self._stiffen(WHEELS[:2] if name == "rear" else WHEELS[2:], 1.0 + by)
+        mujoco.mj_setConst(m, mujoco.MjData(m))
 
     # -- edits of MuJoCo's own model -----------------------------------------------------------
 
@@ -175,9 +203,8 @@ class World:
             self.m.geom_rbound[self.tire[w]] += change
 
     def _edit_cornering_stiffness(self, front: float = 0.0, rear: float = 0.0) -> None:
-        for w in WHEELS:
-            factor = 1.0 + (front if "caster" in w else rear)
-            self.m.geom_user[self.tire[w], COEFFICIENTS + 3] *= factor
+        self._stiffen(WHEELS[:2], 1.0 + rear)
+        self._stiffen(WHEELS[2:], 1.0 + front)
 
     def _edit_load_sensitivity(self, exponent: float) -> None:
         for w in WHEELS:
@@ -282,7 +309,7 @@ class World:
 
 
 SWIVELS = ("left_caster_swivel", "right_caster_swivel")
-COEFFICIENTS = 20  # where a tire's coefficients begin in geom_user
+COEFFICIENTS = 23  # where the coefficients a0, a1, ... of PAC89 begin in geom_user
 
 
 def run(world: World, man: Manoeuvre, seconds: float) -> tuple[dict, np.ndarray]:
@@ -341,12 +368,14 @@ def make(
     trials: int = 6,
     seconds: float = 6.0,
     channels: tuple[str, ...] | None = None,
+    held: int | None = None,
 ) -> None:
-    """Write a study and its sealed answer."""
+    """Write a study and its sealed answer; trial `held` is held out."""
     folder.mkdir(parents=True, exist_ok=True)
-    chosen = [MANOEUVRES[k] for k in _chosen(trials)]
+    which = _chosen(trials)
+    chosen = [MANOEUVRES[k] for k in which]
     if case.kind in ("one", "two", "outside") and case.sigma:
-        _size(case, seed, chosen, seconds)
+        _size(case, seed, tuple(t for k, t in enumerate(which) if k != held), seconds)
     rng = np.random.default_rng([seed, 1])
     world = World(np.random.default_rng([seed, 2]), case.hidden)
     lines = ['model = "manual"', 'scene = "flat"', "", "[noise]"]
@@ -361,12 +390,13 @@ def make(
         file = f"{man.name}_{k}.csv"
         _write(folder / file, table)
         lines += ["", "[[trial]]", f'file = "{file}"', f'manoeuvre = "{man.name}"']
+        lines += ["hold_out = true"] if k == held else []
     (folder / "study.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
     seal(folder / SEAL, case)
 
 
-def _chosen(trials: int) -> list[int]:
-    return {3: [0, 3, 4], 4: [0, 1, 3, 4]}.get(trials, [k % 6 for k in range(trials)])
+def _chosen(trials: int) -> tuple[int, ...]:
+    return {3: (0, 3, 4), 4: (0, 1, 3, 4)}.get(trials, tuple(k % 6 for k in range(trials)))
 
 
 def _write(path: Path, table: dict[str, np.ndarray]) -> None:
@@ -380,7 +410,13 @@ def _write(path: Path, table: dict[str, np.ndarray]) -> None:
 def seal(path: Path, case: Case) -> None:
     """Hide the answer from a casual look."""
     text = json.dumps(
-        {"kind": case.kind, "hidden": case.hidden, "sigma": case.sigma, "channel": case.channel}
+        {
+            "kind": case.kind,
+            "hidden": case.hidden,
+            "sigma": case.sigma,
+            "channel": case.channel,
+            "reached": case.reached,
+        }
     )
     path.write_bytes(base64.b64encode(zlib.compress(text.encode())))
 
@@ -402,9 +438,9 @@ LINEAR = {  # channel -> order of the polynomial that a free initial state takes
 }
 
 
-def detectability(with_it: list[dict], without: list[dict]) -> float:
-    """Sigmas by which two sets of exact runs differ, once each 2 s starts afresh."""
-    total = 0.0
+def apart(with_it: list[dict], without: list[dict]) -> np.ndarray:
+    """What two sets of exact runs differ by, over the noise, once each 2 s starts afresh, (n,)."""
+    out = []
     for a, b in zip(with_it, without, strict=True):
         n = len(next(iter(a.values())))
         for first in range(0, n, 2 * RATE):
@@ -417,23 +453,74 @@ def detectability(with_it: list[dict], without: list[dict]) -> float:
                 t = np.arange(x.size)
                 if order >= 0 and "caster" not in name:
                     x = x - np.polyval(np.polyfit(t, x, order), t)
-                total += float(x @ x) / std**2
-    return float(np.sqrt(total))
+                out.append(x / std)
+    return np.concatenate(out)
 
 
-def _size(case: Case, seed: int, chosen: list[Manoeuvre], seconds: float) -> None:
-    """Scale what is hidden until it shows at about case.sigma."""
+ROUGHLY = {  # what a study knows only roughly: standard deviations, as the documentation has them
+    "mass": 0.05,
+    "inertia": 0.1,
+    "ipos.0": 0.01,
+    "ipos.1": 0.002,
+    "ipos.2": 0.03,
+    "rear": 0.07,
+    "casters": 0.07,
+    "bias.imu_gyro.z": 0.003,
+    "bias.imu_accelerometer.x": 0.05,
+    "bias.imu_accelerometer.y": 0.05,
+}
+
+
+@lru_cache
+def roughly(trial: int, seconds: float) -> np.ndarray:
+    """What one standard deviation of each roughly known number changes in a run, (n, numbers)."""
+    man = MANOEUVRES[trial]
+    plain = run(World(None, {}), man, seconds)[0]
+    columns = []
+    for name, std in ROUGHLY.items():
+        if name.startswith("bias."):
+            channel = name.removeprefix("bias.")
+            moved = dict(plain, **{channel: plain[channel] + std})
+        else:
+            world = World(None, {})
+            world.change(name, std)
+            moved = run(world, man, seconds)[0]
+        columns.append(apart([moved], [plain]))
+    return np.column_stack(columns)
+
+
+def detectability(difference: np.ndarray, known: np.ndarray) -> float:
+    """Sigmas that are left of a difference (n,) once what is roughly known has been fitted."""
+    inner = known.T @ known + np.eye(known.shape[1])
+    off = known.T @ difference
+    return float(np.sqrt(max(difference @ difference - off @ np.linalg.solve(inner, off), 0.0)))
+
+
+def _size(case: Case, seed: int, trials: tuple[int, ...], seconds: float) -> None:
+    """Scale what is hidden until each shows at about case.sigma; `reached` says how far that went.
+
+    Responses are not linear (casters begin to shimmy), so a size is tried again.
+    """
+    chosen = [MANOEUVRES[k] for k in trials]
     plain = World(np.random.default_rng([seed, 2]), {})
     without = [run(plain, man, seconds)[0] for man in chosen]
+    known = np.vstack([roughly(k, seconds) for k in trials])
     for name in case.hidden:
-        if name.startswith("sensor"):
-            only = Case("one", {name: case.hidden[name]}, 0.0, case.channel)
-            exact = [_fault(only, e) for e in without]
-        else:
-            world = World(np.random.default_rng([seed, 2]), {name: case.hidden[name]})
-            exact = [run(world, man, seconds)[0] for man in chosen]
-        seen = detectability(exact, without)
-        scale(case.hidden[name], name, np.clip(case.sigma / max(seen, 1e-6), 0.02, 30.0))
+        for attempt in range(4):
+            if name.startswith("sensor"):
+                only = Case("one", {name: case.hidden[name]}, 0.0, case.channel)
+                exact = [_fault(only, e) for e in without]
+            else:
+                world = World(np.random.default_rng([seed, 2]), {name: case.hidden[name]})
+                exact = [run(world, man, seconds)[0] for man in chosen]
+            case.reached[name] = detectability(apart(exact, without), known)
+            factor = case.sigma / max(case.reached[name], 1e-6)
+            if attempt == 3 or 0.8 < factor < 1.25:
+                break
+            before = dict(case.hidden[name])
+            scale(case.hidden[name], name, float(np.clip(factor, 0.05, 8.0)))
+            if before == case.hidden[name]:  # at the largest size that it may have
+                break
 
 
 def _fault(case: Case, exact: dict) -> dict:
@@ -454,7 +541,7 @@ MOST = {  # beyond these the chair is another vehicle
     "payload": 40.0,
     "cornering_stiffness": 0.7,
     "load_sensitivity": 0.6,
-    "relaxation_length": 0.5,
+    "relaxation_length": 0.09,  # casters shimmy beyond
     "caster_trail": 0.05,
     "torque_gain": 0.5,
     "drive_lag": 0.4,

@@ -2,18 +2,23 @@
 
     python benchmarks/blind/run.py --seed 100 --count 200 --work out/blind
 
-Resumes where it stopped: a study that has a line in results.jsonl is not run again.
+Resumes where it stopped: a study that has a line in results_SEED.jsonl is not run again.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import shutil
 import sys
 import time
+import traceback
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
 from pathlib import Path
 
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parent))
 
 from cases import case
@@ -23,12 +28,16 @@ from table import table
 import mjchair
 
 
-def one(folder: Path, number: int, seed: int, trials: int, seconds: float) -> dict:
+def one(folder: Path, number: int, seed: int, trials: int, seconds: float, threads: int) -> dict:
     """Make, diagnose, and only then open the seal of one study."""
-    study = folder / f"study_{number:03d}"
-    make(study, case(number, seed), 1000 * seed + number, trials, seconds)
+    study = folder / f"study_{seed}_{number:03d}"
+    make(study, case(number, seed), 1000 * seed + number, trials, seconds, held=number % trials)
     began = time.perf_counter()
-    found = mjchair.diagnose(study).to_dict()
+    try:
+        found = mjchair.diagnose(study, threads=threads).to_dict()
+    except Exception:  # a crash is a result, and the table counts it
+        found = {"verdict": "error", "effects": [], "alternatives": [], "candidates": [],
+                 "gap": {}, "notes": [traceback.format_exc()]}  # fmt: skip
     took = time.perf_counter() - began
     answer = unseal(study / SEAL)
     shutil.rmtree(study)
@@ -36,11 +45,14 @@ def one(folder: Path, number: int, seed: int, trials: int, seconds: float) -> di
         "number": number,
         "answer": answer,
         "seconds": took,
-        "verdict": found["verdict"],
-        "effects": found["effects"],
-        "alternatives": found["alternatives"],
-        "candidates": found["candidates"][:5],
-        "gap": found["gap"],
+        **{k: found[k] for k in ("verdict", "effects", "alternatives", "gap", "notes")},
+        "candidates": [
+            {
+                k: c.get(k)
+                for k in ("name", "channel", "detectability", "collinear", "held_out_gain")
+            }
+            for c in found["candidates"]
+        ],
     }
 
 
@@ -51,22 +63,29 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--trials", type=int, default=6)
     parser.add_argument("--seconds", type=float, default=6.0)
+    parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--work", type=Path, default=Path("out/blind"))
     args = parser.parse_args()
     args.work.mkdir(parents=True, exist_ok=True)
     path = args.work / f"results_{args.seed}.jsonl"
     done = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
     have = {line["number"] for line in done}
-    for number in range(args.first, args.first + args.count):
-        if number in have:
-            continue
-        line = one(args.work, number, args.seed, args.trials, args.seconds)
-        with path.open("a") as file:
-            file.write(json.dumps(line) + "\n")
-        done.append(line)
-        names = [e["name"] for e in line["effects"]]
-        print(number, line["answer"]["kind"], list(line["answer"]["hidden"]), line["verdict"],
-              names, line["alternatives"], f"{line['seconds']:.0f} s", flush=True)  # fmt: skip
+    todo = [n for n in range(args.first, args.first + args.count) if n not in have]
+    threads = max(1, (os.cpu_count() or 1) // args.workers)
+    with ProcessPoolExecutor(args.workers, get_context("spawn")) as pool:
+        running = [
+            pool.submit(one, args.work, n, args.seed, args.trials, args.seconds, threads)
+            for n in todo
+        ]
+        for future in as_completed(running):
+            line = future.result()
+            with path.open("a") as file:
+                file.write(json.dumps(line) + "\n")
+            done.append(line)
+            names = [e["name"] for e in line["effects"]]
+            print(line["number"], line["answer"]["kind"], line["answer"]["reached"],
+                  line["verdict"], names, line["alternatives"], f"{line['seconds']:.0f} s",
+                  flush=True)  # fmt: skip
     print(table(done))
 
 

@@ -20,6 +20,9 @@ from mjchair.diagnosis.tracking import Track, track
 from mjchair.effects.effect import Effect, Values, clip
 
 Array = NDArray[np.float64]
+ROUNDS = 6  # at most, of Gauss-Newton
+DONE = 1.0  # chi2 that a further round must promise
+WHERE = ("phase", "frequency", "x", "y", "radius")  # of an effect with a wave or a place
 SENSOR = {"sensor_bias": "bias", "sensor_scale": "scale", "sensor_delay": "delay"}
 
 
@@ -182,8 +185,10 @@ class Fitted:
     Attributes:
       fit, track: where the system is linear. columns: of nuisances and terms.
       system: nuisances first, then a column a free parameter.
-      step: (p,) the last linear step. chi2: of the windows fitted to, with that step put in.
-      total: their sum, with the priors of the nuisances. std: term key -> standard deviation, SI.
+      step: (p,) of the coefficients that stand in no fit, such as sensor biases; zero elsewhere.
+      chi2: of the windows fitted to, with that step put in. total: their sum, with priors.
+      promised: total after one more linear step. std: term key -> standard deviation, SI.
+      sigmas: effect key -> how far its parameters together are from neutral, in standard errors.
       at_bound: parameters that ended on a bound.
     """
 
@@ -194,7 +199,9 @@ class Fitted:
     step: Array
     chi2: Array
     total: float
+    promised: float
     std: dict[str, float]
+    sigmas: dict[str, float]
     at_bound: tuple[str, ...]
 
 
@@ -203,49 +210,104 @@ def refit(
     start: Fit,
     before: Track | None,
     nuisances: dict[str, Column] | None = None,
-    rounds: int = 2,
+    rounds: int = ROUNDS,
 ) -> Fitted:
-    """Nonlinear fit of nuisances and effects within bounds, by Gauss-Newton.
+    """Nonlinear fit of nuisances and effects within bounds: Gauss-Newton, steps halved that fail.
 
     Args:
       start: where to begin. before: a track of a chair that is not far.
-      nuisances: columns to use throughout; None: made anew in every round. They change little, and
-        the residual, which decides where the fit ends, is always new.
+      nuisances: columns to use throughout, with the answers to the slow state of `before`; None:
+        made anew in every round. The residual, which decides where the fit ends, is always new.
     """
-    fit = start
-    found = before
+    best = _around(bench, start, before, nuisances)
+    fit = _moved(bench, best)
+    for _ in range(rounds):
+        if best.total - best.promised < DONE:
+            break
+        here = _around(bench, fit, best.track, nuisances)
+        if here.total < best.total:
+            best, fit = here, _moved(bench, here)
+        else:  # a step too far
+            fit = _between(best.fit, fit)
+    return best
+
+
+def _around(
+    bench: Bench,
+    fit: Fit,
+    before: Track | None,
+    nuisances: dict[str, Column] | None,
+) -> Fitted:
+    """A chair as it is, and the linear system around it."""
     shooter = bench.shooter
-    for turn in range(rounds + 1):
-        model = shooter.compile(fit.edit)
-        found = track(shooter, model, bench.noise, fit.observer(shooter.channels), found)
-        columns = dict(nuisances or nuisance_columns(bench, found, fit))
-        count = len(columns)
-        columns.update(term_columns(bench, found, fit))
-        system = bench.system(found, columns, count, fit)
-        step, total = linear.fit(system, bench.windows, range(count, len(system.names)))
-        spread = linear.spread(system, bench.windows)
-        if turn == rounds:
-            break
-        ahead = moved(fit, system, step)
-        small = np.abs(step[count:]) < 0.02 * np.maximum(spread[count:], 1e-9)
-        if turn and small.size and small.all():
-            break
-        fit = ahead
-    chi2 = np.array([linear.chi2(system, i, step) for i in bench.windows])
+    seen = fit.observer(shooter.channels)
+    model = shooter.compile(fit.edit)
+    found = track(shooter, model, bench.noise, seen, before, anew=nuisances is None)
+    columns = dict(nuisances or nuisance_columns(bench, found, fit))
+    count = len(columns)
+    columns.update(term_columns(bench, found, fit))
+    system = bench.system(found, columns, count, fit)
+    moving = {n.name for n in bench.nuisances if n.edit is not None}
+    staying = [i for i, n in enumerate(system.names[:count]) if n not in moving]
+    step, total = linear.stay(system, bench.windows, staying)
+    covariance = linear.covariance(system, bench.windows)
     std, bound = {}, []
-    for k, key in enumerate(system.names[count:]):
+    for k, key in enumerate(system.names[count:], count):
         term, name = _term(fit, key)
-        std[key] = float(spread[count + k]) * change(term.effect, name)
+        std[key] = float(np.sqrt(max(covariance[k, k], 0.0))) * change(term.effect, name)
         p = term.effect.parameter(name)
         if term.values[name] in (p.low, p.high) and not p.low == p.neutral == term.values[name]:
             bound.append(key)
-    assert found is not None
-    return Fitted(fit, found, columns, system, step, chi2, total, std, tuple(bound))
+    return Fitted(
+        fit,
+        found,
+        columns,
+        system,
+        step,
+        np.array([linear.chi2(system, i, step) for i in bench.windows]),
+        total,
+        linear.fit(system, bench.windows, range(count, len(system.names)))[1],
+        std,
+        {t.effect.key: _sigmas(t, system.names, covariance) for t in fit.terms},
+        tuple(bound),
+    )
+
+
+def _between(one: Fit, other: Fit) -> Fit:
+    """Half way from one fit to another of the same terms."""
+    offsets = {n: 0.5 * (one.offsets.get(n, 0.0) + v) for n, v in other.offsets.items()}
+    terms = tuple(
+        Term(a.effect, {n: 0.5 * (v + b.values[n]) for n, v in a.values.items()}, a.free)
+        for a, b in zip(one.terms, other.terms, strict=True)
+    )
+    return Fit(one.nuisances, offsets, terms)
+
+
+def _sigmas(term: Term, names: Sequence[str], covariance: Array) -> float:
+    """Significance of an effect's size: of its parameters together, times and places aside."""
+    sized = [n for n in term.free if not (term.effect.tags and n in WHERE)]
+    if not sized:
+        return 0.0
+    at = [names.index(f"{term.effect.key}.{n}") for n in sized]
+    away = np.array(
+        [
+            (term.values[n] - term.effect.parameter(n).neutral) / change(term.effect, n)
+            for n in sized
+        ]
+    )
+    return float(np.sqrt(away @ np.linalg.solve(covariance[np.ix_(at, at)], away)))
 
 
 def _term(fit: Fit, key: str) -> tuple[Term, str]:
     effect, _, name = key.rpartition(".")
     return next(t for t in fit.terms if t.effect.key == effect), name
+
+
+def _moved(bench: Bench, found: Fitted) -> Fit:
+    """The fit after the linear step, within walls and bounds."""
+    terms = range(found.system.nuisance, len(found.system.names))
+    step, _ = linear.fit(found.system, bench.windows, terms)
+    return moved(found.fit, found.system, step)
 
 
 def moved(fit: Fit, system: System, step: Array) -> Fit:

@@ -20,6 +20,7 @@ from mjchair.diagnosis.fitting import Bench
 from mjchair.diagnosis.linear import RIDGE, slow_columns
 from mjchair.diagnosis.sensitivity import Column, Pulse, headings
 from mjchair.diagnosis.shooting import residual
+from mjchair.diagnosis.study import Run
 from mjchair.diagnosis.tracking import Track
 
 Array = NDArray[np.float64]
@@ -31,7 +32,8 @@ def drivers(bench: Bench, track: Track) -> list[dict[str, Array]]:
     """What a force may go with, along each window on its simulation grid.
 
     speed (m/s), yaw_rate (rad/s), heading (rad), x, y (m, world), left and right wheel angle (rad),
-    swivel (rad, mean of the casters), left and right torque (N m), time (s).
+    swivel (rad, mean of the casters), left and right torque (N m), phase of the stroke (rad),
+    time (s).
     """
     shooter = bench.shooter
     chair = shooter.chair
@@ -43,9 +45,10 @@ def drivers(bench: Bench, track: Track) -> list[dict[str, Array]]:
         count = len(qpos)
         controls = shooter.controls(shooter.base, w, count)
         left, right = (_angle(qpos, qvel, chair, k) for k in (0, 1))
+        time = w.start + shooter.step * (1 + np.arange(count))
         out.append(
             {
-                "time": w.start + shooter.step * (1 + np.arange(count)),
+                "time": time,
                 "speed": v[:, 0] * east + v[:, 1] * north,
                 "yaw_rate": qvel[:, chair.dof + 5],
                 "heading": np.unwrap(np.arctan2(north, east)),
@@ -56,9 +59,33 @@ def drivers(bench: Bench, track: Track) -> list[dict[str, Array]]:
                 "swivel": 0.5 * (qpos[:, chair.swivel_q[0]] + qpos[:, chair.swivel_q[1]]),
                 "left_torque": controls[:, 0],
                 "right_torque": controls[:, 1],
+                "stroke": np.interp(time, *stroke_phase(shooter.study.runs[w.run])),
             }
         )
     return out
+
+
+def stroke_phase(run: Run) -> tuple[Array, Array]:
+    """Phase (rad) of the strokes of a run that is pushed, at times (s); NaN where it is not.
+
+    A stroke begins where the torque of both wheels rises through a quarter of its largest; the
+    phase grows by one turn from one beginning to the next. Fewer than three strokes have none.
+    """
+    nothing = np.array([-1e9, 1e9]), np.full(2, np.nan)
+    inputs = run.trial.inputs
+    if inputs is None:
+        return nothing
+    total = np.sum([inputs.at(name, inputs.time) for name in inputs.controls], axis=0)
+    level = 0.25 * float(np.percentile(total, 98.0))
+    if level <= 0.0:
+        return nothing
+    begins = inputs.time[1:][(total[1:] >= level) & (total[:-1] < level)]
+    begins = begins[np.r_[True, np.diff(begins) > 0.35]] if begins.size else begins
+    if begins.size < 3:
+        return nothing
+    turns = 2.0 * np.pi * np.arange(begins.size)
+    before, beyond = begins[0] - 1e-6, begins[-1] + 1e-6
+    return np.r_[before, begins, beyond], np.r_[np.nan, turns, np.nan]
 
 
 def _angle(qpos: Array, qvel: Array, chair: Chair, wheel: int) -> Array:
@@ -71,8 +98,11 @@ SHAPES = {
         np.tanh(d["speed"] / 0.05),
         d["speed"],
         d["speed"] * np.abs(d["speed"]),
-        d["speed"] * (np.abs(d["speed"]) > np.median(np.abs(d["speed"]))),
-        np.tanh(d["speed"] / 0.05) * (np.abs(d["speed"]) > 1.15),
+        # any other form: tents over the speed
+        *(
+            np.sign(d["speed"]) * np.clip(1 - np.abs(np.abs(d["speed"]) - v) / 0.4, 0, 1)
+            for v in (0.4, 0.8, 1.2, 1.6, 2.0)
+        ),
     ],
     "yaw_rate": lambda d: [
         np.tanh(d["yaw_rate"] / 0.05),
@@ -84,6 +114,9 @@ SHAPES = {
     "right wheel's turn": lambda d: [np.cos(d["right_angle"]), np.sin(d["right_angle"])],
     "swivel": lambda d: [d["swivel"], np.tanh(d["swivel"] / 0.1)],
     "torque": lambda d: [d["left_torque"], d["right_torque"]],
+    "stroke": lambda d: [
+        np.nan_to_num(wave(k * d["stroke"])) for k in (1, 2) for wave in (np.sin, np.cos)
+    ],
 }
 
 

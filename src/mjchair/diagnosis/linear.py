@@ -401,6 +401,19 @@ def fit(
     return out, found.total - float(found.b[columns] @ coefficients)
 
 
+def stay(
+    system: System, windows: Sequence[int] | NDArray[np.int64], which: Sequence[int]
+) -> tuple[Array, float]:
+    """Coefficients (p,) of the nuisances `which` alone, all else as it is; chi2 with priors."""
+    w, use = list(windows), list(which)
+    G, b = system.G[w].sum(axis=0), system.b[w].sum(axis=0)
+    aim = b[use] - system.back[use]
+    out = np.zeros(len(system.names))
+    out[use] = np.linalg.solve(G[np.ix_(use, use)] + np.eye(len(use)), aim)
+    priced = system.back[: system.nuisance - system.free]
+    return out, float(system.c[w].sum() + priced @ priced - aim @ out[use])
+
+
 def information(system: System, windows: NDArray[np.int64]) -> Array:
     """What data and priors say of all coefficients together: their precision (p, p)."""
     n = system.nuisance
@@ -409,12 +422,12 @@ def information(system: System, windows: NDArray[np.int64]) -> Array:
     return np.asarray(G + np.diag(np.r_[np.ones(n), 1e-8 * size[n:]]))
 
 
-def spread(system: System, windows: NDArray[np.int64]) -> Array:
-    """Standard deviations (p,) of all coefficients together."""
+def covariance(system: System, windows: NDArray[np.int64]) -> Array:
+    """Covariance (p, p) of all coefficients together."""
     full = information(system, windows)
     scale = np.sqrt(np.diag(full))
     inverse = np.linalg.inv(full / np.outer(scale, scale))
-    return np.asarray(np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale)
+    return np.asarray(inverse / np.outer(scale, scale))
 
 
 def chi2(system: System, window: int, coefficients: Array) -> float:

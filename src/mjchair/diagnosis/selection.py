@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mjchair.diagnosis import linear
 from mjchair.diagnosis.candidates import Start
-from mjchair.diagnosis.fitting import Bench
-from mjchair.diagnosis.linear import Reduced, System
+from mjchair.diagnosis.fitting import Term
+from mjchair.diagnosis.linear import Reduced
 
 Array = NDArray[np.float64]
 PENALTY = 10.0  # chi2 that a parameter must bring: log of the number of samples
@@ -90,10 +89,10 @@ def _split(hypothesis: Hypothesis, coefficients: Array) -> list[tuple[Start, Arr
     return out
 
 
-def terms(reduced: Reduced, hypothesis: Hypothesis):  # type: ignore[no-untyped-def]
-    """The effects with values from the linear fit."""
+def terms(reduced: Reduced, hypothesis: Hypothesis, share: float = 1.0) -> tuple[Term, ...]:
+    """The effects with values from a share of the linear fit's coefficients."""
     where = {n: i for i, n in enumerate(reduced.names)}
-    coefficients = reduced.solve([where[c] for c in hypothesis.columns])
+    coefficients = share * reduced.solve([where[c] for c in hypothesis.columns])
     return tuple(start.term(mine) for start, mine in _split(hypothesis, coefficients))
 
 
@@ -170,34 +169,3 @@ def collinearity(reduced: Reduced, a: Hypothesis, b: Hypothesis) -> float:
 
     inner = root(one).T @ reduced.G[np.ix_(one, two)] @ root(two)
     return float(min(1.0, np.linalg.svd(inner, compute_uv=False).max(initial=0.0)))
-
-
-def held_out(
-    bench: Bench, system: System, columns: Sequence[str], by: str = "run"
-) -> tuple[Array, Array]:
-    """Drop of chi2 on windows that the fit did not see: each run (or manoeuvre) in turn.
-
-    Returns:
-      Gains (windows,) and the index of the part that each window was left out with.
-    """
-    runs = bench.shooter.study.runs
-    windows = bench.windows
-    label = [
-        str(system.run[i]) if by == "run" else runs[int(system.run[i])].manoeuvre for i in windows
-    ]
-    if len(set(label)) < 2:  # a single run: every other window
-        label = [str(k % 2) for k in range(len(windows))]
-    names = np.array(label)
-    which = system.index(columns)
-    # nuisances are those of all runs: one run alone hardly determines them, and their
-    # extrapolation would drown what the effect itself predicts
-    (plain, _), (full, _) = (linear.fit(system, windows, w) for w in ([], which))
-    gains = np.zeros(len(windows))
-    for part in sorted(set(label)):
-        inside = names == part
-        theirs = full.copy()
-        theirs[which] = linear.fit(system, windows[~inside], which)[0][which]
-        for k in np.flatnonzero(inside):
-            i = int(windows[k])
-            gains[k] = linear.chi2(system, i, plain) - linear.chi2(system, i, theirs)
-    return gains, names

@@ -15,13 +15,14 @@ from mjchair.diagnosis import begin
 from mjchair.diagnosis.chair import BROAD, LINKED, SLOW, STANDING, STEPS, Chair, State
 from mjchair.diagnosis.noise import Noise
 from mjchair.diagnosis.observe import Observer
-from mjchair.diagnosis.shooting import Job, Shooter, residual
+from mjchair.diagnosis.shooting import Job, Outcome, Shooter, residual
+from mjchair.diagnosis.windows import Window
 from mjchair.engine.install import installed
 from mjchair.simulation import names
 from mjchair.simulation.initial import start
 
 Array = NDArray[np.float64]
-ROUNDS = 2  # Gauss-Newton rounds a window; one where a track is near
+ROUNDS, KEPT_ROUNDS = 2, 3  # Gauss-Newton rounds a window; where its columns are known already
 
 
 @dataclass
@@ -75,6 +76,7 @@ def _moving_prior(shooter: Shooter, window: int) -> Array:
     seen = begin.observed(shooter.study.runs[w.run])
     if w.index == 0:
         loose = np.where(seen, BROAD, np.array([1.0, 1.0, 0.05, 1.0, 0.3, 0.3, 0.3]))
+        loose[5:] = np.where(seen[5:], BROAD[5:], 0.3)  # nothing has turned the casters yet
         given = shooter.study.runs[w.run].given
         if "speed" in given and not seen[3]:
             loose[3] = 0.1
@@ -88,12 +90,13 @@ def track(
     noise: dict[str, Noise],
     observer: Observer | None = None,
     before: Track | None = None,
+    anew: bool = False,
 ) -> Track:
     """Fit the slow state of every window.
 
     Args:
       model: of any size; states are those of the base model. before: a track to start from, of a
-        model that is not far.
+        model that is not far; its answers to the slow state are kept, unless made `anew`.
     """
     chair = shooter.chair
     coarse = shooter.coarsened(model)
@@ -106,7 +109,8 @@ def track(
     states: list[State | None] = [None] * count
     firsts = first_states(shooter, shooter.base) if before is None else {}
     predicted: list[Array] = [np.empty(0)] * count
-    slow: list[Array] = [np.empty(0)] * count
+    kept = before is not None and not anew
+    slow: list[Array] = list(before.slow) if before and kept else [np.empty(0)] * count
     traces: list[dict[str, Array]] = [{}] * count
     with installed():
         for index in sorted(by_index):
@@ -117,22 +121,22 @@ def track(
                     states[i] = before.states[i].copy()
                 elif states[i] is None:
                     states[i] = firsts[w.run].copy()
-            for _ in range(ROUNDS if before is None else 1):
+            search = {i: Search(_some(states[i])) for i in members}
+            for _ in range(KEPT_ROUNDS if kept else ROUNDS):
                 _fit_round(
-                    shooter,
-                    chair,
-                    (model, coarse),
-                    observer,
-                    members,
-                    states,
-                    white,
-                    predicted,
-                    slow,
+                    shooter, chair, (model, coarse), observer, search, white, predicted, slow, kept
                 )
-            jobs = [Job(model, shooter.windows[i], _some(states[i])) for i in members]
-            for i, outcome in zip(members, shooter.run(jobs, trace=True), strict=True):
+            outcomes = _traced(shooter, model, [(i, search[i].state) for i in members])
+            for i, outcome in outcomes.items():
+                w = shooter.windows[i]
+                predicted[i] = observer.observe(shooter, w, outcome.predicted)
+                search[i].judge(_size(shooter, w, predicted[i], white))
+            worse = [i for i in members if search[i].state is not search[i].best]
+            again = _traced(shooter, model, [(i, search[i].best) for i in worse])
+            for i in members:
+                outcome = again.get(i, outcomes[i])
                 predicted[i] = observer.observe(shooter, shooter.windows[i], outcome.predicted)
-                traces[i] = outcome.trace
+                states[i], traces[i] = search[i].best, outcome.trace
                 _hand_over(shooter, model, i, outcome.trace, states)
     return Track([_some(s) for s in states], predicted, slow, traces)
 
@@ -142,46 +146,102 @@ def _some(state: State | None) -> State:
     return state
 
 
+@dataclass
+class Search:
+    """The state of one window while it is fitted.
+
+    Attributes:
+      state: that was tried last. best, size: the best so far, and its misfit. change: from the
+        best to the one that was tried.
+    """
+
+    state: State
+    best: State | None = None
+    size: float = np.inf
+    change: Array | None = None
+
+    def judge(self, size: float) -> bool:
+        """Take the misfit of the state; False where it is worse than the best."""
+        if size > 1.001 * self.size:
+            return False
+        self.best, self.size = self.state, size
+        return True
+
+
+def _traced(
+    shooter: Shooter, model: mujoco.MjModel, which: list[tuple[int, State | None]]
+) -> dict[int, Outcome]:
+    jobs = [Job(model, shooter.windows[i], _some(state)) for i, state in which]
+    done = shooter.run(jobs, trace=True) if jobs else []
+    return {i: outcome for (i, _), outcome in zip(which, done, strict=True)}
+
+
+def _size(shooter: Shooter, window: Window, seen: Array, white: Array) -> float:
+    """Misfit of a window, where its free columns fit it best."""
+    miss = residual(shooter.measured(window), seen, shooter.channels)
+    free = _free_columns(shooter).any(axis=1)
+    miss[:, free] -= np.nanmean(miss[:, free], axis=0) if free.any() else 0.0
+    return float(np.nansum((miss / white) ** 2))
+
+
 def _fit_round(
     shooter: Shooter,
     chair: Chair,
     models: tuple[mujoco.MjModel, mujoco.MjModel],
     observer: Observer,
-    members: list[int],
-    states: list[State | None],
+    search: dict[int, Search],
     white: Array,
     predicted: list[Array],
     slow: list[Array],
+    kept: bool,
 ) -> None:
+    """One Gauss-Newton step of the slow states; `kept`: their columns are known."""
     jobs = []
-    for i in members:
-        state, w = _some(states[i]), shooter.windows[i]
-        jobs += [Job(models[0], w, state), Job(models[1], w, state)]
+    for i, s in search.items():
+        w = shooter.windows[i]
+        jobs.append(Job(models[0], w, s.state))
+        if kept:
+            continue
+        jobs.append(Job(models[1], w, s.state))
         jobs += [
-            Job(models[1], w, chair.moved(state, STEPS[k] * np.eye(len(SLOW))[k]))
+            Job(models[1], w, chair.moved(s.state, STEPS[k] * np.eye(len(SLOW))[k]))
             for k in range(len(SLOW))
         ]
     outcomes = shooter.run(jobs)
-    each = 2 + len(SLOW)
-    for n, i in enumerate(members):
+    each = 1 if kept else 2 + len(SLOW)
+    for n, (i, s) in enumerate(search.items()):
         w = shooter.windows[i]
         seen = [
             observer.observe(shooter, w, o.predicted) for o in outcomes[n * each : n * each + each]
         ]
+        if not s.judge(_size(shooter, w, seen[0], white)):
+            s.change = 0.3 * _there(s.change)  # a step too far
+            s.state = chair.moved(_some(s.best), s.change)
+            continue
         predicted[i] = seen[0]
-        slow[i] = np.stack([s - seen[1] for s in seen[2:]], axis=2)
-        miss = residual(shooter.measured(w), seen[0], shooter.channels)
-        there = ~np.isnan(miss)
-        columns = np.concatenate([slow[i], _free_columns(shooter)[None].repeat(len(miss), 0)], 2)
-        a = (columns / white[None, :, None])[there]
-        b = (miss / white)[there]
-        spread = np.r_[
-            prior(shooter, i, _some(states[i])) / STEPS, np.full(columns.shape[2] - len(SLOW), 1e4)
-        ]
-        normal = a.T @ a + np.diag(1.0 / spread**2)
-        change = np.linalg.solve(normal, a.T @ b)[: len(SLOW)]
-        change *= min(1.0, 20.0 / max(np.abs(change).max(), 1e-9))  # shortened, never turned
-        states[i] = chair.moved(_some(states[i]), change * STEPS)
+        if not kept:
+            slow[i] = np.stack([y - seen[1] for y in seen[2:]], axis=2)
+        s.change = _step(shooter, i, s.state, seen[0], slow[i], white) * STEPS
+        s.state = chair.moved(s.state, s.change)
+
+
+def _there(change: Array | None) -> Array:
+    assert change is not None
+    return change
+
+
+def _step(shooter: Shooter, i: int, state: State, seen: Array, slow: Array, white: Array) -> Array:
+    """Linear step of a window's slow state, in units of chair.STEPS, (7,)."""
+    miss = residual(shooter.measured(shooter.windows[i]), seen, shooter.channels)
+    there = ~np.isnan(miss)
+    columns = np.concatenate([slow, _free_columns(shooter)[None].repeat(len(miss), 0)], 2)
+    a = (columns / white[None, :, None])[there]
+    b = (miss / white)[there]
+    spread = np.r_[prior(shooter, i, state) / STEPS, np.full(columns.shape[2] - len(SLOW), 1e4)]
+    normal = a.T @ a + np.diag(1.0 / spread**2)
+    change = np.linalg.solve(normal, a.T @ b)[: len(SLOW)]
+    # shortened, never turned
+    return np.asarray(change * min(1.0, 20.0 / max(np.abs(change).max(), 1e-9)))
 
 
 def _free_columns(shooter: Shooter) -> Array:

@@ -10,6 +10,7 @@ NAMED, AMBIGUOUS, UNKNOWN, NONE = "named", "ambiguous", "unknown", "none"
 
 # Frozen on the development seeds of benchmarks/blind (README there)
 CLOSES = 0.8  # of the excess, that a named effect closes
+HELD = 10.0  # chi2 that it must bring on runs that it was not fitted to
 SIGMAS = 4.0  # of a parameter away from neutral
 RIVAL_CHI2 = 10.0  # a rival this near, in chi2 with its penalty, is not ruled out
 RIVAL_ERRORS = 2.0  # nor one this near in paired standard errors over windows

@@ -13,7 +13,7 @@ def edit(spec: mujoco.MjSpec, coulomb: float, viscous: float) -> None:
     for wheel in parts.REAR:
         joint = parts.named(spec.joints, wheel, "joint")
         joint.frictionloss += coulomb
-        joint.damping = joint.damping + viscous
+        joint.damping[0] += viscous  # the others are of a polynomial in speed
 
 
 EFFECT = Effect(
