@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from mjchair.diagnosis import force, linear, selection
-from mjchair.diagnosis.experiments import suggest
+from mjchair.diagnosis import advice, experiments, force, linear, selection
 from mjchair.diagnosis.fitting import Fitted
 from mjchair.diagnosis.gap import Gap
 from mjchair.diagnosis.linear import System
@@ -36,14 +35,14 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     closed = closure(gap, base, choice.fitted, choice.after[-1]) if choice else 0.0
     verdict = _verdict(base, gap, choice, closed)
     alternatives = _alternatives(choice) if choice and verdict == AMBIGUOUS else []
-    advice = ""
-    if verdict == AMBIGUOUS:
-        advice = suggest(name for group in alternatives for name in group)
+    left = _drivers(choice.after[-1] if choice else gap)
+    planned, following = None, ""
+    if verdict == AMBIGUOUS and choice:
+        near = [r.fitted for group in choice.rivals for r in group] or [base.plain]
+        planned = experiments.plan(base.bench, choice.fitted, near)
+        following = advice.deciding(planned, base.bench.shooter)
     elif verdict == UNKNOWN:
-        advice = (
-            "Repeat the run with the largest gap without changes: what comes back at the same "
-            "place, time or wheel angle tells what it is tied to."
-        )
+        following = advice.searching(left)
     named = verdict in (NAMED, AMBIGUOUS) and choice is not None
     return Diagnosis(
         verdict,
@@ -52,10 +51,16 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         _ranked(base, gap, choice),
         _summary(base, gap, choice),
         _where(base),
-        advice,
+        following,
         _notes(base, choice, closed, verdict),
-        _drivers(choice.after[-1] if choice else gap),
-        {"base": base, "gap": gap, "choice": choice, "fitted": choice.fitted if choice else None},
+        left,
+        {
+            "base": base,
+            "gap": gap,
+            "choice": choice,
+            "fitted": choice.fitted if choice else None,
+            "experiments": planned,
+        },
     )
 
 

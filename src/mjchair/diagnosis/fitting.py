@@ -142,12 +142,9 @@ def term_columns(bench: Bench, found: Track, fit: Fit) -> dict[str, Column]:
                     bench.shooter, found, term.effect.name, str(term.effect.channel), size
                 )
                 continue
-            share = 0.25 * size
-            p = term.effect.parameter(name)
-            if not p.low <= term.values[name] + share <= p.high:
-                share = -share
+            beside, factor = nudged(fit, term, name)
             names.append(key)
-            points.append(Point(_shifted(fit, term, name, share), size / share))
+            points.append(Point(beside.edit, factor))
     if points:
         # a point here is a whole chair, so nothing comes before its edit
         base = sensitivity.predictions(
@@ -169,10 +166,16 @@ def change(effect: Effect, name: str) -> float:
     return {"Hz": 0.05, "rad": 0.3}.get(p.unit, 0.1)
 
 
-def _shifted(fit: Fit, term: Term, name: str, by: float):  # type: ignore[no-untyped-def]
-    values = {**term.values, name: term.values[name] + by}
+def nudged(fit: Fit, term: Term, name: str) -> tuple[Fit, float]:
+    """A fit with one parameter a little aside, and its typical change over that little."""
+    size = change(term.effect, name)
+    share = 0.25 * size
+    p = term.effect.parameter(name)
+    if not p.low <= term.values[name] + share <= p.high:
+        share = -share
+    values = {**term.values, name: term.values[name] + share}
     terms = tuple(Term(t.effect, values, t.free) if t is term else t for t in fit.terms)
-    return Fit(fit.nuisances, fit.offsets, terms).edit
+    return Fit(fit.nuisances, fit.offsets, terms), size / share
 
 
 @dataclass
@@ -182,7 +185,8 @@ class Fitted:
     Attributes:
       fit, track: where the system is linear. columns: of nuisances and terms.
       system: nuisances first, then a column a free parameter.
-      chi2: of the windows fitted to, with the best sensor biases. total: their sum, with priors.
+      step: (p,) of the coefficients that stand in no fit, such as sensor biases; zero elsewhere.
+      chi2: of the windows fitted to, with that step put in. total: their sum, with priors.
       promised: total after one more linear step. std: term key -> standard deviation, SI.
       sigmas: effect key -> how far its parameters together are from neutral, in standard errors.
       at_bound: parameters that ended on a bound.
@@ -192,6 +196,7 @@ class Fitted:
     track: Track
     columns: dict[str, Column]
     system: System
+    step: Array
     chi2: Array
     total: float
     promised: float
@@ -263,6 +268,7 @@ def _around(
         found,
         columns,
         system,
+        step,
         np.array([linear.chi2(system, i, step) for i in bench.windows]),
         total,
         linear.fit(system, bench.windows, range(count, len(system.names)))[1],
@@ -304,8 +310,13 @@ def _term(fit: Fit, key: str) -> tuple[Term, str]:
 
 def _moved(bench: Bench, found: Fitted) -> Fit:
     """The fit after the linear step, within walls and bounds."""
-    fit, system = found.fit, found.system
-    step, _ = linear.fit(system, bench.windows, range(system.nuisance, len(system.names)))
+    terms = range(found.system.nuisance, len(found.system.names))
+    step, _ = linear.fit(found.system, bench.windows, terms)
+    return moved(found.fit, found.system, step)
+
+
+def moved(fit: Fit, system: System, step: Array) -> Fit:
+    """The fit after a step (p,) of the system's coefficients, within walls and bounds."""
     offsets = dict(fit.offsets)
     mechanical = {n.name for n in fit.nuisances if n.edit is not None}
     for name, by in zip(system.names[: system.nuisance], step, strict=False):

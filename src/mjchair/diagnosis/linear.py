@@ -160,12 +160,8 @@ def build(
         J = white(i, np.stack([columns[n][i] for n in names], axis=2))
         slow, precision = slow_columns(shooter, track, i)
         Z = white(i, slow)
-        factor = cho_factor(Z.T @ Z + np.diag(precision + RIDGE))
-        Zr, ZJ = Z.T @ r, Z.T @ J
-        G[i] = J.T @ J - ZJ.T @ cho_solve(factor, ZJ)
-        b[i] = J.T @ r - ZJ.T @ cho_solve(factor, Zr)
+        G[i], b[i], c[i], factor = eliminated(r, J, Z, precision)
         raw += (J * J).sum(axis=0)
-        c[i] = r @ r - Zr @ cho_solve(factor, Zr)
         known = np.column_stack([r, J[:, :nuisance]])
         bands.append(_bands(white.sizes(i), w.last - w.first, known, Z, factor))
     # what a free initial state takes away whole is nothing but rounding afterwards
@@ -178,6 +174,25 @@ def build(
     step = fit(system, windows, [])[0][:nuisance]
     system.cells = [_cells(band, step) for band in bands]
     return system
+
+
+def eliminated(
+    r: Array, J: Array, Z: Array, precision: Array
+) -> tuple[Array, Array, float, tuple[Array, bool]]:
+    """Products of one window's white columns, its slow state eliminated.
+
+    Args:
+      r: (samples,) residual. J: (samples, p) columns. Z: (samples, k) of the slow state, with
+        prior precisions (k,).
+
+    Returns:
+      G (p, p), b (p,), chi2 of the residual, and the factor of the slow state's own block.
+    """
+    factor = cho_factor(Z.T @ Z + np.diag(precision + RIDGE))
+    Zr, ZJ = Z.T @ r, Z.T @ J
+    G = J.T @ J - ZJ.T @ cho_solve(factor, ZJ)
+    b = J.T @ r - ZJ.T @ cho_solve(factor, Zr)
+    return G, b, float(r @ r - Zr @ cho_solve(factor, Zr)), factor
 
 
 def basis(sizes: Sequence[int], span: float) -> list[Array]:
@@ -399,12 +414,17 @@ def stay(
     return out, float(system.c[w].sum() + priced @ priced - aim @ out[use])
 
 
-def covariance(system: System, windows: NDArray[np.int64]) -> Array:
-    """Covariance (p, p) of all coefficients together."""
+def information(system: System, windows: NDArray[np.int64]) -> Array:
+    """What data and priors say of all coefficients together: their precision (p, p)."""
     n = system.nuisance
     G = system.G[windows].sum(axis=0)
     size = np.maximum(np.diag(G), 1e-12)
-    full = G + np.diag(np.r_[np.ones(n), 1e-8 * size[n:]])
+    return np.asarray(G + np.diag(np.r_[np.ones(n), 1e-8 * size[n:]]))
+
+
+def covariance(system: System, windows: NDArray[np.int64]) -> Array:
+    """Covariance (p, p) of all coefficients together."""
+    full = information(system, windows)
     scale = np.sqrt(np.diag(full))
     inverse = np.linalg.inv(full / np.outer(scale, scale))
     return np.asarray(inverse / np.outer(scale, scale))

@@ -266,11 +266,15 @@ def _hand_over(
         return
     at = round((shooter.windows[following[0]].start - w.start) / model.opt.timestep) - 1
     at = min(max(at, 0), len(trace["qpos"]) - 1)
+    states[following[0]] = base_state(shooter, model, trace, at)
+
+
+def base_state(shooter: Shooter, model: mujoco.MjModel, trace: dict[str, Array], at: int) -> State:
+    """The base model's state at row `at` of a trace of a model that may have more to it."""
     base = shooter.base
     full = State(trace["qpos"][at].copy(), trace["qvel"][at].copy(), trace["act"][at].copy())
     if (model.nq, model.nv, model.na) == (base.nq, base.nv, base.na):
-        states[following[0]] = shooter.resting(full, model, back=True)
-        return
+        return shooter.resting(full, model, back=True)
     out = State(base.qpos0.copy(), np.zeros(base.nv), np.zeros(base.na))
     for j, name in enumerate(names.joints(base)):
         k = names.joints(model).index(name)
@@ -286,4 +290,4 @@ def _hand_over(
         at_model = model.actuator_actadr[k]
         if at_base >= 0:
             out.act[at_base : at_base + count] = full.act[at_model : at_model + count]
-    states[following[0]] = out
+    return out

@@ -10,6 +10,8 @@ from collections.abc import Iterable, Mapping, Sequence
 import matplotlib
 from matplotlib.figure import Figure
 
+from mjchair.diagnosis.advice import plain
+from mjchair.diagnosis.experiments import Plan
 from mjchair.diagnosis.linear import BAND
 from mjchair.diagnosis.verdict import CLOSES, Diagnosis, Named, Ranked
 from mjchair.effects.library import find
@@ -27,6 +29,7 @@ td.n,th.n{text-align:right}tr.chosen{background:#eef3f8}
 """
 FAMILY = 0.01  # level of the gap test
 CANDIDATES = 14  # rows of the table
+EXPERIMENTS = 8  # rows of theirs
 
 
 def figures(diagnosis: Diagnosis) -> dict[str, bytes]:
@@ -304,7 +307,27 @@ def _gap(diagnosis: Diagnosis, drawn: Mapping[str, bytes]) -> list[str]:
 
 def _next(diagnosis: Diagnosis) -> list[str]:
     said = html.escape(diagnosis.next_experiment) or "These data decide; none is needed."
-    return ["<h2>7. The experiment to do next</h2>", f"<p>{said}</p>"]
+    plan: Plan | None = diagnosis.stages.get("experiments")
+    return [
+        "<h2>7. The experiment to do next</h2>",
+        f"<p>{said}</p>",
+        *(_experiments(plan) if plan is not None else []),
+    ]
+
+
+def _experiments(plan: Plan) -> list[str]:
+    head = ("manoeuvre", *(f"!from {html.escape(plain(rival))} (sigma)" for rival in plan.rivals))
+    rows = [
+        (html.escape(e.manoeuvre.name), *(f"{t**0.5:.1f}" for t in e.separations))
+        for e in plan.experiments[:EXPERIMENTS]
+    ]
+    return [
+        _table(head, rows, [k == 0 for k in range(len(rows))]),
+        f'<p class="note">{len(rows)} of {len(plan.experiments)} manoeuvres, best first, and '
+        "simplest first above 10 sigmas, simulated with the corrected chair: how far each "
+        "explanation would fall behind, after everything that is only roughly known and its own "
+        "parameters have done their best.</p>",
+    ]
 
 
 def _assumed(diagnosis: Diagnosis) -> list[str]:

@@ -1,0 +1,155 @@
+"""The next experiment: what is proposed separates, by about as much as was promised."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mjchair
+from mjchair.diagnosis import advice, experiments, workflow
+from mjchair.diagnosis.experiments import Evidence, Experiment, Plan
+from mjchair.diagnosis.fitting import Fit, Term, refit
+from mjchair.diagnosis.linear import Whitener
+from mjchair.diagnosis.manoeuvres import LIBRARY, Setting, possible, setting
+from mjchair.diagnosis.shooting import Shooter
+from mjchair.diagnosis.study import Run, make_study
+from mjchair.diagnosis.tracking import track
+from mjchair.effects.library import find
+from mjchair.measurement.trial import Trial
+from mjchair.simulation.initial import Initial
+
+NOISE = {
+    "heading": 0.01,
+    "left_wheel_speed": 0.05,
+    "right_wheel_speed": 0.05,
+    "imu_gyro.z": 0.02,
+    "position.x": 0.02,
+    "position.y": 0.02,
+}
+TRUTH = {"coefficient": 0.002}
+ONE_WAY = (Initial((0.0, 0.0), 0.3, 1.5), Initial((0.0, 0.5), 0.3, 1.2))
+BY_NAME = {m.name: m for m in LIBRARY}
+
+
+def measured(rng, name, start, seconds, inputs=None):
+    """A run of a chair with more rolling resistance than its model has."""
+    spec = mjchair.load_spec()
+    find("rolling_resistance").apply(spec, TRUTH)
+    run = mjchair.simulate(spec, inputs, seconds, initial=start, sample_rate=50.0)
+    noisy = {c: run[c] + std * rng.standard_normal(run.time.size) for c, std in NOISE.items()}
+    return Run(Trial(name, run.time, noisy, inputs, {}), name, False, Initial(), frozenset())
+
+
+def fitted(bench, found, name, free):
+    effect = find(name)
+    start = {**effect.neutral(), free[0]: 0.001}
+    fit = Fit(bench.nuisances, {}, (Term(effect, start, free),))
+    return refit(bench, fit, found, rounds=1)
+
+
+@pytest.fixture(scope="module")
+def one_way():
+    """Coasts in one heading, and three explanations of them."""
+    rng = np.random.default_rng(3)
+    runs = [measured(rng, f"coast {k}", start, 4.0) for k, start in enumerate(ONE_WAY)]
+    bench, found = workflow.prepare(make_study(mjchair.load_spec(), runs, NOISE))
+    rolling = fitted(bench, found, "rolling_resistance", ("coefficient",))
+    slope = fitted(bench, found, "floor_slope", ("x", "y"))
+    bearing = fitted(bench, found, "bearing_friction", ("coulomb",))
+    return rng, runs, bench, (rolling, slope, bearing)
+
+
+@pytest.fixture(scope="module")
+def against_slope(one_way):
+    _, _, bench, (rolling, slope, _) = one_way
+    return experiments.plan(bench, rolling, [slope], doubts=())
+
+
+def test_a_slope_is_told_from_rolling_by_another_heading(against_slope):
+    assert against_slope.best.manoeuvre.name in ("coast reversed", "coast across", "stand")
+    least = {e.manoeuvre.name: e.least for e in against_slope.experiments}
+    assert least["coast"] < 0.1 * least["coast reversed"]
+    assert against_slope.best.least > 9.0
+
+
+def test_what_is_promised_is_what_the_experiment_gives(one_way, against_slope):
+    rng, runs, bench, (rolling, slope, _) = one_way
+    best = against_slope.best
+    here = setting(bench.shooter.study)
+    start = here.initial(best.manoeuvre)
+    further = measured(rng, "new", start, best.manoeuvre.seconds)
+    study = make_study(mjchair.load_spec(), [*runs, further], NOISE)
+    shooter = Shooter(study)
+    again = replace(bench, shooter=shooter, whitener=Whitener(shooter, bench.noise))
+    totals = []
+    for before in (rolling, slope):
+        model = shooter.compile(before.fit.edit)
+        found = track(shooter, model, bench.noise)
+        totals.append(refit(again, before.fit, found, rounds=1).total)
+    grown = (totals[1] - totals[0]) - (slope.total - rolling.total)
+    t = best.least
+    assert abs(grown - t) < 3.0 * 2.0 * math.sqrt(t) + 0.1 * t
+
+
+def test_a_load_tells_rolling_from_bearings(one_way):
+    _, _, bench, (rolling, _, bearing) = one_way
+    found = experiments.plan(bench, rolling, [bearing])
+    order = [e.manoeuvre.name for e in found.experiments]
+    assert "loaded coast" in order[:3]
+    assert order.index("loaded coast") < order.index("coast")
+    assert found.chosen == ("rolling_resistance",) and found.rivals == ("bearing_friction",)
+
+
+def test_nothing_separates_a_chair_from_itself(one_way):
+    _, _, bench, (rolling, _, _) = one_way
+    few = [BY_NAME["coast reversed"], BY_NAME["loaded coast"]]
+    found = experiments.plan(bench, rolling, [rolling], few)
+    assert max(e.least for e in found.experiments) < 1e-3
+
+
+def test_longer_runs_and_less_noise_separate_more(one_way):
+    _, _, bench, (rolling, slope, _) = one_way
+    lengths = [replace(BY_NAME["coast reversed"], seconds=s) for s in (2.0, 4.0, 6.0)]
+
+    def separations(bench):
+        found = experiments.plan(bench, rolling, [slope], lengths).experiments
+        return [e.least for e in sorted(found, key=lambda e: e.manoeuvre.seconds)]
+
+    loud = separations(bench)
+    assert loud[0] < loud[1] < loud[2]
+    finer = {c: replace(n, white=0.5 * n.white, slow=0.5 * n.slow) for c, n in bench.noise.items()}
+    for quiet, before in zip(separations(replace(bench, noise=finer)), loud, strict=True):
+        assert before < quiet <= 4.0 * before * (1.0 + 1e-9)
+
+
+def test_a_lab_without_torque_gets_none():
+    assert all(m.torque is None for m in possible(Setting((0.0, 0.0), 0.0, 0.0)))
+    assert len(possible(Setting((0.0, 0.0), 0.0, 10.0))) == len(LIBRARY)
+    assert len({m.name for m in LIBRARY}) == len(LIBRARY)
+
+
+def plan_of(*least):
+    ordered = tuple(Experiment(m, (t,)) for m, t in zip(LIBRARY, least, strict=False))
+    evidence = Evidence("left_wheel_speed", 5.7, 3.0, 2.8, 9.0)
+    return Plan(("rolling_resistance",), ("sensor_bias:imu_gyro.z",), ordered, (evidence,))
+
+
+def test_the_words_say_what_to_do_and_what_to_see(one_way):
+    shooter = one_way[2].shooter
+    said = advice.deciding(plan_of(25.0, 1.0), shooter)
+    assert LIBRARY[0].words in said and "about 5 sigmas" in said
+    assert "0.2 rad/s lower if it is sensor bias of imu_gyro.z" in said
+    assert " Or " not in said and "repeat" not in said
+    assert " Or " in advice.deciding(plan_of(25.0, 24.0), shooter)
+    assert "repeat it 3 times" in advice.deciding(plan_of(3.5), shooter)
+    assert "No manoeuvre of the library decides" in advice.deciding(plan_of(0.0), shooter)
+
+
+@pytest.mark.parametrize(
+    ("tied", "word"),
+    [("left wheel's turn", "left wheel"), ("time in coast_0", "exactly"), ("heading", "180")],
+)
+def test_an_unknown_force_is_looked_for_where_it_goes(tied, word):
+    assert word in advice.searching([{"force": "Fx", "goes_with": tied, "sigmas": 9.0}])
+    assert advice.searching([]) == advice.OTHERWISE
