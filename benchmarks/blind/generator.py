@@ -506,7 +506,10 @@ def _size(case: Case, seed: int, trials: tuple[int, ...], seconds: float) -> Non
     without = [run(plain, man, seconds)[0] for man in chosen]
     known = np.vstack([roughly(k, seconds) for k in trials])
     for name in case.hidden:
-        for attempt in range(4):
+        first, size = dict(case.hidden[name]), 1.0
+        low, high = 0.0, np.inf
+        for _ in range(6):
+            case.hidden[name] = scaled(first, name, size)
             if name.startswith("sensor"):
                 only = Case("one", {name: case.hidden[name]}, 0.0, case.channel)
                 exact = [_fault(only, e) for e in without]
@@ -515,12 +518,12 @@ def _size(case: Case, seed: int, trials: tuple[int, ...], seconds: float) -> Non
                 exact = [run(world, man, seconds)[0] for man in chosen]
             case.reached[name] = detectability(apart(exact, without), known)
             factor = case.sigma / max(case.reached[name], 1e-6)
-            if attempt == 3 or 0.8 < factor < 1.25:
-                break
-            before = dict(case.hidden[name])
-            scale(case.hidden[name], name, float(np.clip(factor, 0.05, 8.0)))
-            if before == case.hidden[name]:  # at the largest size that it may have
-                break
+            if 0.8 < factor < 1.25 or scaled(first, name, 1.2 * size) == case.hidden[name]:
+                break  # or at the largest size that it may have
+            low, high = (max(low, size), high) if factor > 1.0 else (low, min(high, size))
+            size *= float(np.clip(factor, 0.02, 6.0))
+            if not low < size < high:
+                size = float(np.sqrt(max(low, 0.01 * high) * high))
 
 
 def _fault(case: Case, exact: dict) -> dict:
@@ -559,8 +562,8 @@ MOST = {  # beyond these the chair is another vehicle
 }
 
 
-def scale(p: dict[str, float], name: str, factor: float) -> None:
-    """Scale the size of an effect, not its place or time."""
+def scaled(p: dict[str, float], name: str, factor: float) -> dict[str, float]:
+    """An effect of another size, at the same place and time."""
     fixed = {
         "surface_patch": ("x", "y", "radius"),
         "rider_sway": ("mass", "frequency", "phase"),
@@ -568,11 +571,7 @@ def scale(p: dict[str, float], name: str, factor: float) -> None:
         "gust": ("when", "way"),
     }.get(name, ())
     most = MOST.get(name, np.inf)
-    for key in p:
-        if key in fixed:
-            continue
-        factor_here = np.sqrt(factor) if name == "wind" else factor
-        if name == "tire_friction":
-            p[key] = float(np.clip(1.0 - (1.0 - p[key]) * factor, 0.08, 0.9))
-        else:
-            p[key] = float(np.clip(p[key] * factor_here, -most, most))
+    by = np.sqrt(factor) if name == "wind" else factor
+    if name == "tire_friction":
+        return {"factor": float(np.clip(1.0 - (1.0 - p["factor"]) * factor, 0.08, 1.0))}
+    return {k: v if k in fixed else float(np.clip(v * by, -most, most)) for k, v in p.items()}

@@ -114,9 +114,9 @@ def nuisance_columns(bench: Bench, found: Track, fit: Fit) -> dict[str, Column]:
     columns = sensitivity.differences(bench.shooter, found, points, fit.edit, observer)
     names = [*(n.name for n in mechanical), "half_step", "integrator"]
     out = dict(zip(names, columns, strict=True))
-    late = 0.5 * bench.shooter.input_step()
+    late = bench.shooter.input_step() / np.sqrt(12.0)
     if late > 0.0 and found.coarse is not None:
-        # a torque that changes between two samples is known to within half of their distance
+        # a torque that changes between two samples changes anywhere between them
         model = bench.shooter.compile(fit.edit, coarse=True)
         shifted = sensitivity.predictions(bench.shooter, found, model, observer, late)
         out["input_timing"] = [a - b for a, b in zip(shifted, found.coarse, strict=True)]

@@ -23,6 +23,7 @@ from mjchair.effects.effect import Effect
 
 Say = Callable[[str], None]
 NEAR = 0.5  # prior standard deviations that columns of nuisances are good for
+SEEN = 10.0  # sigmas that one standard deviation of a nuisance changes
 FAR = 2.5  # prior standard deviations: a nuisance there is not what moved
 AT_REST = 0.01  # m/s^2, bias of an accelerometer that was seen at rest
 
@@ -99,7 +100,10 @@ def screen_columns(
 
 
 def _farthest(plain: Fitted) -> float:
-    return max((abs(v) for v in plain.fit.offsets.values()), default=0.0)
+    """The largest distance of a nuisance from its prior, of those that the data see."""
+    back = plain.system.back
+    seen = np.sqrt(np.diag(plain.system.G.sum(axis=0)))[: len(back)] > SEEN
+    return float(np.abs(back[seen]).max(initial=0.0))
 
 
 def gap_after(base: Base, fitted: Fitted) -> tuple[Gap, System, Reduced]:

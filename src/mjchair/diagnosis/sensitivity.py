@@ -138,7 +138,8 @@ def effect_points(effect: Effect, seed: Seed) -> list[Point]:
     def edit(values: Values) -> Callable[[mujoco.MjSpec], None]:
         return lambda spec: effect.apply(spec, values)
 
-    return [Point(edit(values)) for values in seed.points]
+    factors = seed.factors or (1.0,) * len(seed.points)
+    return [Point(edit(v), f) for v, f in zip(seed.points, factors, strict=True)]
 
 
 def nuisance_points(nuisances: Sequence[Nuisance]) -> list[Point]:

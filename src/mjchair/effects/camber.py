@@ -17,7 +17,7 @@ def edit(spec: mujoco.MjSpec, angle: float) -> None:
 
 EFFECT = Effect(
     name="camber",
-    parameters=(Parameter("angle", "rad", 0.05, -0.3, 0.3),),
+    parameters=(Parameter("angle", "rad", 0.05, -0.3, 0.3, probe=1.0),),
     signature="side force from gamma Fz; cancels between left and right but for load transfer",
     source="sports chairs up to 20 deg; bent axles a degree or two",
     edit=edit,

@@ -18,7 +18,7 @@ def edit(spec: mujoco.MjSpec, symmetric: float, asymmetric: float) -> None:
 EFFECT = Effect(
     name="toe",
     parameters=(
-        Parameter("symmetric", "rad", 0.015, -0.15, 0.15),
+        Parameter("symmetric", "rad", 0.015, -0.15, 0.15, probe=1.0),
         Parameter("asymmetric", "rad", 0.01, -0.15, 0.15),
     ),
     signature="symmetric: drag that grows in turns; asymmetric: side force and yaw at v > 0",
