@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -42,8 +43,8 @@ class Store:
         try:
             with np.load(path, allow_pickle=False) as data:
                 return [data[f"w{i}"] for i in range(len(data.files))]
-        except (OSError, ValueError, KeyError):
-            return None
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+            return None  # cut short: it is made again
 
     def save(self, key: str, arrays: Sequence[Array]) -> None:
         """Keep arrays, whole or not at all."""
