@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -95,6 +96,23 @@ def test_the_corrected_chair_rolls(done, tmp_path):
     out = str(tmp_path / "roll")
     arguments = ["simulate", "--model", str(model), "--duration", "0.2", "--out", out]
     assert cli.main(arguments) == 0
+
+
+def test_a_second_diagnosis_of_the_corrected_chair_finds_nothing(done, tmp_path):
+    study, out = done
+    again = tmp_path / "again"
+    shutil.copytree(study, again)
+    shutil.copy(out / "model.xml", again / "corrected.xml")
+    text = (again / "study.toml").read_text()
+    (again / "study.toml").write_text(text.replace('"manual"', '"corrected.xml"'))
+    assert cli.main(["diagnose", str(again), "--out", str(tmp_path / "out")]) == 0
+    found = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert found["verdict"] == "none" and not found["effects"]
+    assert found["gap"]["before"] < 0.1 * gap_before(out)
+
+
+def gap_before(out):
+    return json.loads((out / "diagnosis.json").read_text())["gap"]["before"]
 
 
 def test_results_are_not_overwritten(done, capsys):
