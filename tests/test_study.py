@@ -136,6 +136,14 @@ TRUE = {  # runs that a rule about units might take for something else
         "left_wheel_speed": (2.0 - 0.5 * TIME) / 0.3,
         "imu_accelerometer.x": np.full(TIME.size, -0.05),
     },
+    "driven gently down a slope": {
+        "left_wheel_speed": (0.1 + 0.5 * TIME) / 0.3,
+        "imu_accelerometer.x": np.full(TIME.size, 0.05),
+    },
+    "one wheel rocked and the other spun": {
+        "left_wheel_speed": 0.25 * np.sin(3.0 * TIME),
+        "right_wheel_speed": np.full(TIME.size, 10.0),
+    },
     "a turn about one wheel": {
         "left_wheel_speed": np.full(TIME.size, 0.04),
         "right_wheel_speed": np.full(TIME.size, 2.4),
