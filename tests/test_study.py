@@ -2,11 +2,14 @@ import numpy as np
 import pytest
 
 import mjchair
-from mjchair.diagnosis import noise
+from mjchair.diagnosis import begin, noise
 from mjchair.errors import MjchairError
 from mjchair.measurement import samples
 
 TIME = np.arange(0.0, 3.0, 0.02)
+
+
+EAST = "[trial.initial]\nheading = 0.0\n"
 
 
 def write(folder, columns, extra="", head='model = "manual"\n'):
@@ -76,7 +79,7 @@ def test_a_dead_channel_is_left_out_and_said(tmp_path):
 
 def test_a_dead_channel_of_a_standing_chair_stays(tmp_path):
     still = {"left_wheel_speed": np.zeros(TIME.size), "imu_gyro.z": 0.01 * np.sin(40.0 * TIME)}
-    study = mjchair.read_study(write(tmp_path, still))
+    study = mjchair.read_study(write(tmp_path, still, EAST))
     assert "left_wheel_speed" in study.channels and not study.notes
 
 
@@ -95,7 +98,7 @@ def test_what_lies_outside_the_measurements_is_left_out_and_said(tmp_path):
 def test_one_measured_wheel_stands_for_both_and_that_is_said(tmp_path):
     torque = 3.0 + TIME
     columns = {"right_wheel_speed": wheels()["right_wheel_speed"], "right_wheel": torque}
-    study = mjchair.read_study(write(tmp_path, columns))
+    study = mjchair.read_study(write(tmp_path, columns, EAST))
     controls = study.runs[0].trial.inputs.controls
     assert np.array_equal(controls["left_wheel"], torque)
     assert study.notes == (
@@ -108,12 +111,12 @@ def test_a_coast_with_one_wheel_is_said_and_one_with_a_gyroscope_needs_no_word(t
     one = {"left_wheel_speed": wheels()["left_wheel_speed"]}
     assert "only the left wheel was measured" in mjchair.read_study(write(tmp_path, one)).notes[0]
     gyro = one | {"imu_gyro.z": 0.1 * np.sin(TIME)}
-    assert mjchair.read_study(write(tmp_path, gyro)).notes == ()
+    assert mjchair.read_study(write(tmp_path, gyro, EAST)).notes == ()
 
 
 def test_one_torque_column_stays_one_where_a_turn_was_measured(tmp_path):
     columns = wheels() | {"left_wheel": np.full(TIME.size, 3.0)}
-    study = mjchair.read_study(write(tmp_path, columns))
+    study = mjchair.read_study(write(tmp_path, columns, EAST))
     assert set(study.runs[0].trial.inputs.controls) == {"left_wheel"}
     assert study.notes == ("a: no torque column of the right wheel; it is not driven",)
 
@@ -195,6 +198,31 @@ def test_trials_need_not_have_the_same_channels(tmp_path):
     assert [set(r.trial.other) for r in study.runs] == [{"rider_motion"}, set()]
     assert study.channels == ("left_wheel_speed", "right_wheel_speed")
     assert set(study.runs[1].trial.channels) == {"left_wheel_speed"}
+
+
+def test_a_heading_that_nothing_tells_is_said(tmp_path):
+    said = "the heading of a is neither measured nor given"
+    assert mjchair.read_study(write(tmp_path, wheels())).notes[0].startswith(said)
+    for columns, trial in ((wheels(), EAST), (wheels() | {"heading": 0.1 * TIME}, "")):
+        assert not mjchair.read_study(write(tmp_path, columns, trial)).notes
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("turn", [0.0, 0.4, -0.4])
+def test_places_tell_the_first_heading(sign, turn, tmp_path):
+    rng = np.random.default_rng(0)
+    heading = 2.5 + turn * TIME
+    x = 3.0 + np.cumsum(sign * np.cos(heading)) * 0.02
+    y = 1.0 + np.cumsum(sign * np.sin(heading)) * 0.02
+    columns = {
+        "left_wheel_speed": np.full(TIME.size, sign / 0.3 - turn * 0.28 / 0.3),
+        "right_wheel_speed": np.full(TIME.size, sign / 0.3 + turn * 0.28 / 0.3),
+        "position.x": x + 0.01 * rng.standard_normal(TIME.size),
+        "position.y": y + 0.01 * rng.standard_normal(TIME.size),
+    }
+    found = begin.initial(mjchair.read_study(write(tmp_path, columns)).runs[0])
+    assert found.heading == pytest.approx(2.5, abs=0.06)
+    assert found.speed == pytest.approx(sign, abs=0.02)
 
 
 def test_noise_is_that_of_the_runs_that_are_fitted_to(tmp_path):

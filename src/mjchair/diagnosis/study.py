@@ -128,7 +128,24 @@ def make_study(
         trial, noticed = _checked(run.trial)
         checked.append(replace(run, trial=trial))
         said += noticed
+    said += _without_heading(checked)
     return Study(spec, tuple(checked), dict(noise or {}), dict(nuisance or {}), tuple(said), source)
+
+
+def _without_heading(runs: list[Run]) -> list[str]:
+    """A note on the runs of which nothing tells where in the world they head."""
+    tells = ({"heading"}, {"position.x", "position.y"})
+    blind = [
+        run.trial.name
+        for run in runs
+        if "heading" not in run.given and not any(t <= set(run.trial.channels) for t in tells)
+    ]
+    if not blind:
+        return []
+    return [
+        f"the heading of {', '.join(blind)} is neither measured nor given; each is taken to start "
+        "at heading 0, and a slope or a wind is one along or across that"
+    ]
 
 
 def _checked(trial: Trial) -> tuple[Trial, list[str]]:
