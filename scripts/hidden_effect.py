@@ -2,8 +2,8 @@
 
     python scripts/hidden_effect.py --out out/hidden_effect
 
-The slalom is held out: no fit sees it, so it shows whether the corrected chair is right where it
-was not made to be. Each step is what the command line does; see docs/diagnosis.md.
+`hide` holds the slalom out: no fit sees it, so it shows whether the corrected chair is right where
+it was not made to be. Each step is what the command line does; see docs/diagnosis.md.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from pathlib import Path
 from mjchair import cli
 
 EFFECT = "rolling_resistance"
-HELD_OUT = "slalom"
 
 
 def main() -> int:
@@ -34,8 +33,6 @@ def main() -> int:
         ["diagnose", str(study), "--out", str(second)],
     )
     for number, step in enumerate(steps):
-        if number == 1:
-            hold_out(study, HELD_OUT)
         if number == 2:
             explain_by(study, first / "model.xml")
         print("$ mjchair", *step, flush=True)
@@ -46,15 +43,6 @@ def main() -> int:
     cli.main(["hide", "--reveal", str(study)])
     print(summary(first), summary(second), sep="\n")
     return 0
-
-
-def hold_out(study: Path, manoeuvre: str) -> None:
-    """Hold the runs of a manoeuvre out of every fit."""
-    file = study / "study.toml"
-    line = f'manoeuvre = "{manoeuvre}"\n'
-    text = file.read_text()
-    if f"{line}hold_out" not in text:
-        file.write_text(text.replace(line, line + "hold_out = true\n"))
 
 
 def explain_by(study: Path, model: Path) -> None:

@@ -3,6 +3,11 @@
 import json
 import math
 import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
 
 import mujoco
 import numpy as np
@@ -11,6 +16,7 @@ import pytest
 import mjchair
 from mjchair import cli
 from mjchair.commands.diagnose import CANDIDATE, GAP, TOP
+from mjchair.diagnosis.store import Store
 from mjchair.effects.library import find
 
 CHANNELS = {"left_wheel_speed": 0.02, "right_wheel_speed": 0.02, "imu_gyro.z": 0.01}
@@ -92,6 +98,23 @@ def test_the_corrected_chair_rolls(done, tmp_path):
     assert cli.main(arguments) == 0
 
 
+def test_a_second_diagnosis_of_the_corrected_chair_finds_nothing(done, tmp_path):
+    study, out = done
+    again = tmp_path / "again"
+    shutil.copytree(study, again)
+    shutil.copy(out / "model.xml", again / "corrected.xml")
+    text = (again / "study.toml").read_text()
+    (again / "study.toml").write_text(text.replace('"manual"', '"corrected.xml"'))
+    assert cli.main(["diagnose", str(again), "--out", str(tmp_path / "out")]) == 0
+    found = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert found["verdict"] == "none" and not found["effects"]
+    assert found["gap"]["before"] < 0.1 * gap_before(out)
+
+
+def gap_before(out):
+    return json.loads((out / "diagnosis.json").read_text())["gap"]["before"]
+
+
 def test_results_are_not_overwritten(done, capsys):
     study, out = done
     before = {p.name: p.stat().st_mtime_ns for p in out.iterdir()}
@@ -163,3 +186,65 @@ def test_bad_arguments_are_one_line_and_nothing_is_written(done, tmp_path, capsy
         assert cli.main(arguments) == 2, arguments
         assert one_line(capsys)
         assert not out.exists(), arguments
+
+
+def started(study, out, after):
+    """A diagnosis in a process of its own, once it has kept `after` simulations."""
+    command = [sys.executable, "-m", "mjchair", "diagnose", str(study), "--out", str(out)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 300.0
+    while len(kept(out)) < after and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert process.poll() is None, process.communicate()
+    return process
+
+
+def kept(out):
+    return {p.name: p.stat().st_mtime_ns for p in (out / "unfinished").glob("[!.]*.npz")}
+
+
+def test_an_interrupted_run_goes_on_from_what_was_kept(done, tmp_path, monkeypatch):
+    study, whole = done
+    out = tmp_path / "out"
+
+    process = started(study, out, 2)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert said.startswith("mjchair: interrupted") and said.count("\n") == 1
+    first = kept(out)
+    assert len(first) >= 2
+
+    process = started(study, out, len(first) + 3)
+    process.send_signal(signal.SIGKILL)
+    process.communicate(timeout=60)
+    second = kept(out)
+    assert first.items() <= second.items()  # none was made again
+    assert {p.name for p in out.iterdir()} == {"unfinished"}
+
+    loaded = set()
+    load = Store.load
+
+    def counted(self, key):
+        found = load(self, key)
+        if found is not None:
+            loaded.add(f"{key}.npz")
+        return found
+
+    monkeypatch.setattr(Store, "load", counted)
+    assert cli.main(["diagnose", str(study), "--out", str(out)]) == 0
+    assert set(second) <= loaded
+    assert (out / "diagnosis.json").read_text() == (whole / "diagnosis.json").read_text()
+    assert not (out / "unfinished").exists()
+
+
+def test_a_simulation_that_was_cut_short_is_made_again(tmp_path):
+    store = Store(tmp_path)
+    store.save("a", [np.arange(1000.0), np.ones((2, 2))])
+    assert np.array_equal(store.load("a")[0], np.arange(1000.0))
+    path = tmp_path / "a.npz"
+    for size in (0, 10, 500, path.stat().st_size - 1):
+        whole = path.read_bytes()
+        path.write_bytes(whole[:size])
+        assert store.load("a") is None
+        path.write_bytes(whole)

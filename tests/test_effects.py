@@ -1,3 +1,5 @@
+import math
+
 import mujoco
 import numpy as np
 import pytest
@@ -90,3 +92,27 @@ def test_errors_name_the_value_and_the_rule():
         find("rolling_resistence")
     with pytest.raises(MjchairError, match="must be within"):
         find("toe").apply(mjchair.load_spec(), {"symmetric": 2.0})
+
+
+def test_a_delayed_heading_is_in_the_model_itself():
+    time = np.arange(0.0, 2.0, 0.01)
+    swing = 5.0 * np.sin(2.0 * np.pi * time)
+    inputs = mjchair.Inputs(time, {"left_wheel": -swing, "right_wheel": swing})
+    seen = []
+    for delay in (0.0, 0.04):
+        spec = mjchair.load_spec()
+        find("sensor_delay", "heading").apply(spec, {"delay": delay})
+        model = mujoco.MjSpec.from_string(spec.to_xml())
+        start = {"speed": 1.0, "heading": math.pi}  # where the angle wraps
+        seen.append(mjchair.simulate(model, inputs, 2.0, initial=start, sample_rate=250.0))
+    plain, late = (np.unwrap(run["heading"]) for run in seen)
+    after = seen[0].time > 0.1
+    expected = np.interp(seen[0].time - 0.04, seen[0].time, plain)
+    assert np.abs(seen[1]["heading"]).max() <= math.pi
+    off = np.abs(late - expected)[after].max()
+    assert off < 0.1 * np.abs(plain - expected)[after].max()
+
+
+def test_what_cannot_be_delayed_says_so():
+    with pytest.raises(MjchairError, match="MuJoCo delays no sensor of a tire"):
+        find("sensor_delay", "left_wheel_tire.Fx")

@@ -2,9 +2,14 @@ import numpy as np
 import pytest
 
 import mjchair
+from mjchair.diagnosis import begin, noise
 from mjchair.errors import MjchairError
+from mjchair.measurement import samples
 
 TIME = np.arange(0.0, 3.0, 0.02)
+
+
+EAST = "[trial.initial]\nheading = 0.0\n"
 
 
 def write(folder, columns, extra="", head='model = "manual"\n'):
@@ -70,6 +75,169 @@ def test_a_dead_channel_is_left_out_and_said(tmp_path):
     study = mjchair.read_study(write(tmp_path, columns))
     assert "imu_gyro.z" not in study.channels
     assert any("imu_gyro.z is exactly zero" in note for note in study.notes)
+
+
+def test_a_dead_channel_of_a_standing_chair_stays(tmp_path):
+    still = {"left_wheel_speed": np.zeros(TIME.size), "imu_gyro.z": 0.01 * np.sin(40.0 * TIME)}
+    study = mjchair.read_study(write(tmp_path, still, EAST))
+    assert "left_wheel_speed" in study.channels and not study.notes
+
+
+def test_what_lies_outside_the_measurements_is_left_out_and_said(tmp_path):
+    torque = np.full(TIME.size, 3.0)
+    seen = {n: np.where((TIME > 0.5) & (TIME < 2.5), v, np.nan) for n, v in wheels().items()}
+    columns = {n: ["" if np.isnan(x) else x for x in v] for n, v in seen.items()}
+    study = mjchair.read_study(write(tmp_path, columns | {"left_wheel": torque}))
+    trial = study.runs[0].trial
+    assert (trial.time[0], trial.time[-1]) == (0.52, 2.48)
+    assert all(v.shape == trial.time.shape for v in trial.channels.values())
+    assert trial.inputs.time[0] == 0.0
+    assert any("nothing was measured before 0.52 s or after 2.48 s" in n for n in study.notes)
+
+
+def test_one_measured_wheel_stands_for_both_and_that_is_said(tmp_path):
+    torque = 3.0 + TIME
+    columns = {"right_wheel_speed": wheels()["right_wheel_speed"], "right_wheel": torque}
+    study = mjchair.read_study(write(tmp_path, columns, EAST))
+    controls = study.runs[0].trial.inputs.controls
+    assert np.array_equal(controls["left_wheel"], torque)
+    assert study.notes == (
+        "a: only the right wheel was measured; the left one is assumed alike, and nothing tells "
+        "how the chair turns",
+    )
+
+
+def test_a_coast_with_one_wheel_is_said_and_one_with_a_gyroscope_needs_no_word(tmp_path):
+    one = {"left_wheel_speed": wheels()["left_wheel_speed"]}
+    assert "only the left wheel was measured" in mjchair.read_study(write(tmp_path, one)).notes[0]
+    gyro = one | {"imu_gyro.z": 0.1 * np.sin(TIME)}
+    assert mjchair.read_study(write(tmp_path, gyro, EAST)).notes == ()
+
+
+def test_one_torque_column_stays_one_where_a_turn_was_measured(tmp_path):
+    columns = wheels() | {"left_wheel": np.full(TIME.size, 3.0)}
+    study = mjchair.read_study(write(tmp_path, columns, EAST))
+    assert set(study.runs[0].trial.inputs.controls) == {"left_wheel"}
+    assert study.notes == ("a: no torque column of the right wheel; it is not driven",)
+
+
+def test_the_smartwheel_recording_is_a_study():
+    study = mjchair.read_study(samples.folder() / "smartwheel")
+    assert study.channels == ("left_wheel_angle",)
+    controls = study.runs[0].trial.inputs.controls
+    assert np.array_equal(controls["left_wheel"], controls["right_wheel"])
+    assert controls["left_wheel"].max() > 8.0
+    assert "the right one is assumed alike" in study.notes[0]
+
+
+TRUE = {  # runs that a rule about units might take for something else
+    "rolling down a slope that the accelerometer does not see": {
+        "left_wheel_speed": (0.5 + 0.5 * TIME) / 0.3,
+        "imu_accelerometer.x": np.full(TIME.size, -0.05),
+    },
+    "slowing up a slope": {
+        "left_wheel_speed": (2.0 - 0.5 * TIME) / 0.3,
+        "imu_accelerometer.x": np.full(TIME.size, -0.05),
+    },
+    "driven gently down a slope": {
+        "left_wheel_speed": (0.1 + 0.5 * TIME) / 0.3,
+        "imu_accelerometer.x": np.full(TIME.size, 0.05),
+    },
+    "one wheel rocked and the other spun": {
+        "left_wheel_speed": 0.25 * np.sin(3.0 * TIME),
+        "right_wheel_speed": np.full(TIME.size, 10.0),
+    },
+    "a turn about one wheel": {
+        "left_wheel_speed": np.full(TIME.size, 0.04),
+        "right_wheel_speed": np.full(TIME.size, 2.4),
+        "imu_gyro.z": np.full(TIME.size, 1.26),
+    },
+    "a spin on the spot": {
+        "left_wheel_speed": np.full(TIME.size, -5.0),
+        "right_wheel_speed": np.full(TIME.size, 5.2),
+        "velocity.x": np.full(TIME.size, 0.03),
+        "heading": (5.4 * TIME + np.pi) % (2.0 * np.pi) - np.pi,
+    },
+    "a racer": {"left_wheel_speed": np.full(TIME.size, 28.0)},
+    "a heading that goes on over turns": {
+        "imu_gyro.z": np.full(TIME.size, 6.0),
+        "heading": 1.0 + 6.0 * TIME,
+    },
+    "a sensor upside down": {"imu_accelerometer.z": -9.81 + 0.1 * np.sin(TIME)},
+}
+
+
+@pytest.mark.parametrize("name", TRUE)
+def test_units_that_are_right_are_left_alone(name, tmp_path):
+    assert set(mjchair.read_study(write(tmp_path, TRUE[name])).channels) == set(TRUE[name])
+
+
+def test_a_model_is_found_beside_the_study(tmp_path, monkeypatch):
+    (tmp_path / "chairs").mkdir()
+    exact = mjchair.load_spec("power", "ramp", grade=0.05)
+    (tmp_path / "chairs" / "mine.xml").write_text(exact.to_xml())
+    write(tmp_path, wheels(), head='model = "chairs/mine.xml"\n')
+    monkeypatch.chdir("/")
+    study = mjchair.read_study(tmp_path)
+    assert study.spec.compile().body_mass.sum() == pytest.approx(exact.compile().body_mass.sum())
+
+
+def test_a_scene_and_its_grade_are_the_studys(tmp_path):
+    write(tmp_path, wheels(), head='model = "power"\nscene = "ramp"\ngrade = 0.05\n')
+    quat = mjchair.read_study(tmp_path).spec.geom("floor").quat
+    assert 2.0 * np.arcsin(abs(quat[2])) == pytest.approx(np.arctan(0.05))
+
+
+def test_trials_need_not_have_the_same_channels(tmp_path):
+    write(tmp_path, wheels() | {"rider_motion": 0.02 * np.sin(TIME)})
+    text = (tmp_path / "a.csv").read_text().splitlines()
+    (tmp_path / "b.csv").write_text("\n".join(r.rsplit(",", 2)[0] for r in text) + "\n")
+    with (tmp_path / "study.toml").open("a") as file:
+        file.write('[[trial]]\nfile = "b.csv"\n')
+    study = mjchair.read_study(tmp_path)
+    assert [set(r.trial.other) for r in study.runs] == [{"rider_motion"}, set()]
+    assert study.channels == ("left_wheel_speed", "right_wheel_speed")
+    assert set(study.runs[1].trial.channels) == {"left_wheel_speed"}
+
+
+def test_a_heading_that_nothing_tells_is_said(tmp_path):
+    said = "the heading of a is neither measured nor given"
+    assert mjchair.read_study(write(tmp_path, wheels())).notes[0].startswith(said)
+    for columns, trial in ((wheels(), EAST), (wheels() | {"heading": 0.1 * TIME}, "")):
+        assert not mjchair.read_study(write(tmp_path, columns, trial)).notes
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("turn", [0.0, 0.4, -0.4])
+def test_places_tell_the_first_heading(sign, turn, tmp_path):
+    rng = np.random.default_rng(0)
+    heading = 2.5 + turn * TIME
+    x = 3.0 + np.cumsum(sign * np.cos(heading)) * 0.02
+    y = 1.0 + np.cumsum(sign * np.sin(heading)) * 0.02
+    columns = {
+        "left_wheel_speed": np.full(TIME.size, sign / 0.3 - turn * 0.28 / 0.3),
+        "right_wheel_speed": np.full(TIME.size, sign / 0.3 + turn * 0.28 / 0.3),
+        "position.x": x + 0.01 * rng.standard_normal(TIME.size),
+        "position.y": y + 0.01 * rng.standard_normal(TIME.size),
+    }
+    found = begin.initial(mjchair.read_study(write(tmp_path, columns)).runs[0])
+    assert found.heading == pytest.approx(2.5, abs=0.06)
+    assert found.speed == pytest.approx(sign, abs=0.02)
+
+
+def test_noise_is_that_of_the_runs_that_are_fitted_to(tmp_path):
+    rng = np.random.default_rng(0)
+    quiet = {n: v + 0.02 * rng.standard_normal(v.size) for n, v in wheels().items()}
+    write(tmp_path, quiet)
+    loud = {n: v + 0.5 * rng.standard_normal(v.size) for n, v in wheels().items()}
+    loud["imu_gyro.z"] = 0.3 * rng.standard_normal(TIME.size)
+    (tmp_path / "more").mkdir()
+    write(tmp_path / "more", loud)
+    with (tmp_path / "study.toml").open("a") as file:
+        file.write('[[trial]]\nfile = "more/a.csv"\nhold_out = true\n')
+    found = noise.estimate(mjchair.read_study(tmp_path))
+    assert found["left_wheel_speed"].total == pytest.approx(0.02, rel=0.3)
+    assert found["imu_gyro.z"].total == pytest.approx(0.3, rel=0.3)  # no other run has it
 
 
 def test_a_clock_that_jumps_is_refused(tmp_path):

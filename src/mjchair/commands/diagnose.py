@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -42,7 +43,11 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
     )
     parser.add_argument("study", metavar="STUDY", help="folder with study.toml and its tables")
     parser.add_argument(
-        "--effect", metavar="FILE", action="append", default=[], help="an effect of your own"
+        "--effect",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="an effect of your own, see docs/diagnosis.md",
     )
     parser.add_argument("--threads", type=int, default=2, help="default: %(default)s")
     options.add_output(parser, "out/diagnose")
@@ -55,26 +60,32 @@ def run(args: argparse.Namespace) -> int:
     from mjchair.diagnosis.store import Store
     from mjchair.diagnosis.study import read_study
     from mjchair.diagnosis.workflow import diagnose
-    from mjchair.effects.library import from_file
+    from mjchair.effects import own
     from mjchair.storage import check_vacant, output_folder
 
     if args.threads < 1:
         raise MjchairError(f"--threads is {args.threads}; it must be at least 1")
     shooting.THREADS = args.threads
     kept = Path(args.out) / CACHE
-    force = args.force or _only(kept)
+    force = args.force or _interrupted(kept)
     check_vacant(args.out, force)
     study = read_study(args.study)
-    effects = [from_file(path) for path in args.effect]
+    effects = [own.from_file(path) for path in args.effect]
+    for effect in effects:
+        own.check(effect, study.spec)
     folder = output_folder(args.out, force)
     try:
         with _progress() as say:
             found = diagnose(study, effects=effects, say=say, store=Store(kept))
             say("report")
-            _write(folder, study, found)
+            _write(folder, kept, study, found)
     except MjchairError:
         _clear(folder, kept)
         raise
+    except KeyboardInterrupt:
+        said = f"interrupted; what was computed is in {kept}, and the same command goes on from it"
+        print(f"mjchair: {said}", file=sys.stderr)
+        return 130
     shutil.rmtree(kept, ignore_errors=True)
     print(f"{_line(found)}; see {folder}/report.html")
     return 0
@@ -95,8 +106,8 @@ def _progress() -> Iterator[Callable[[str], None]]:
         yield say
 
 
-def _write(folder: Path, study: Study, found: Diagnosis) -> None:
-    """Make everything first, then write it, the verdict last."""
+def _write(folder: Path, kept: Path, study: Study, found: Diagnosis) -> None:
+    """Make everything first, then write it beside the simulations, then move it, verdict last."""
     from mjchair.diagnosis.workflow import corrected
     from mjchair.model.spec import compile_spec, exact_xml
     from mjchair.report.diagnosis_page import figures, page
@@ -108,10 +119,12 @@ def _write(folder: Path, study: Study, found: Diagnosis) -> None:
     drawn = figures(found)
     files: dict[str, str | bytes] = {f"{name}.png": image for name, image in drawn.items()}
     files["model.xml"] = spec.to_xml()
-    files["report.html"] = page(found, drawn, f"Diagnosis of {Path(study.source).name}")
+    files["report.html"] = page(found, drawn, f"Diagnosis of {Path(study.source).resolve().name}")
     files["diagnosis.json"] = json.dumps(contract(found), indent=1, allow_nan=False) + "\n"
     for name, content in files.items():
-        write_whole(folder / name, content)
+        write_whole(kept / name, content)
+    for name in files:
+        (kept / name).replace(folder / name)
 
 
 def contract(found: Diagnosis) -> dict[str, Any]:
@@ -130,9 +143,9 @@ def _clear(folder: Path, kept: Path) -> None:
         folder.rmdir()
 
 
-def _only(kept: Path) -> bool:
-    """Whether the output folder holds an interrupted diagnosis and nothing else."""
-    return kept.is_dir() and [p.name for p in kept.parent.iterdir()] == [CACHE]
+def _interrupted(kept: Path) -> bool:
+    """Whether the output folder holds an interrupted diagnosis, whose verdict comes last."""
+    return kept.is_dir() and not (kept.parent / "diagnosis.json").exists()
 
 
 def _line(found: Diagnosis) -> str:

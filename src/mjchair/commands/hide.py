@@ -6,9 +6,13 @@ import argparse
 import json
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mjchair.commands import options
 from mjchair.errors import MjchairError
+
+if TYPE_CHECKING:
+    from mjchair.effects.effect import Effect
 
 
 def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -20,7 +24,10 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
         "answer sealed beside it. `mjchair hide --reveal STUDY` opens the seal.",
     )
     parser.add_argument(
-        "effect", metavar="EFFECT", nargs="?", help="such as toe, or sensor_bias:imu_gyro.z"
+        "effect",
+        metavar="EFFECT",
+        nargs="?",
+        help="such as toe, sensor_bias:imu_gyro.z, or a file of your own",
     )
     parser.add_argument("--reveal", metavar="STUDY", help="print a sealed answer instead")
     parser.add_argument("--set", metavar="NAME=VALUE", action="append", default=[])
@@ -32,26 +39,33 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 def run(args: argparse.Namespace) -> int:
     """Run the command; returns the exit code."""
     from mjchair.diagnosis.practice import hide, reveal
-    from mjchair.effects.library import find
-    from mjchair.storage import output_folder
+    from mjchair.storage import check_vacant, output_folder, write_whole
 
     if args.reveal:
         print(json.dumps(reveal(Path(args.reveal))))
         return 0
     if not args.effect:
         raise MjchairError("no effect to hide; name one, such as rolling_resistance")
-    name, _, channel = args.effect.partition(":")
-    effect = find(name, channel or None)
+    effect = _effect(args.effect)
     values = dict(_value(text) for text in args.set)
+    check_vacant(args.out, args.force)
+    files = hide(effect, values or None, args.seed)
     folder = output_folder(args.out, args.force)
-    try:
-        hide(effect, folder, values or None, args.seed)
-    except MjchairError:
-        if not any(folder.iterdir()):
-            folder.rmdir()
-        raise
+    for file, content in files.items():
+        write_whole(folder / file, content)
     print(f"wrote {folder}/study.toml and its tables", file=sys.stderr)
     return 0
+
+
+def _effect(text: str) -> Effect:
+    """The effect of a name, with its channel behind a colon, or of a Python file."""
+    from mjchair.effects import own
+    from mjchair.effects.library import find
+
+    if text.endswith(".py"):
+        return own.from_file(text)
+    name, _, channel = text.partition(":")
+    return find(name, channel or None)
 
 
 def _value(text: str) -> tuple[str, float]:

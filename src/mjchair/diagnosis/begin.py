@@ -12,6 +12,7 @@ Array = NDArray[np.float64]
 RADIUS, TRACK = 0.3, 0.56  # m, of the rear wheels; a first guess only
 STANDS = (0.03, 0.05)  # m/s and rad/s, below which a chair stands
 SPAN = 0.3  # s, of the line through the first samples
+CHORD = 0.5  # m, of the way at whose start the heading is read off
 
 
 def _first(run: Run, channel: str) -> tuple[float, float] | None:
@@ -38,7 +39,7 @@ def observed(run: Run) -> NDArray[np.bool_]:
         [
             "position.x" in have,
             "position.y" in have,
-            "heading" in have,
+            "heading" in have or place,
             rolls or place,
             "imu_gyro.z" in have or both or "heading" in have,
             "left_caster_angle" in have,
@@ -53,7 +54,7 @@ def initial(run: Run) -> Initial:
     What study.toml gives is a first guess as well: every window frees it.
     """
     start = run.initial
-    heading = _value(run, "heading", start.heading)
+    heading = initial_heading(run)
     x, y = _value(run, "position.x", None), _value(run, "position.y", None)
     position = start.position if x is None or y is None else (x, y)
     speed = start.speed if "speed" in run.given else _speed(run)
@@ -61,6 +62,42 @@ def initial(run: Run) -> Initial:
     if "speed" not in run.given and abs(speed) < STANDS[0] and abs(yaw) < STANDS[1]:
         speed = yaw = 0.0
     return Initial(position=position, heading=heading or 0.0, speed=speed, yaw_rate=yaw)
+
+
+def initial_heading(run: Run) -> float | None:
+    """Heading at the first sample, rad: measured, given, or where the chair goes; None: unknown."""
+    given = run.initial.heading if "heading" in run.given else _heading(run)
+    return _value(run, "heading", given)
+
+
+def _heading(run: Run) -> float | None:
+    """Where the chair goes at first, rad, from its places; None: not measured, or it stays there.
+
+    The chord of an arc leans by half of what was turned along it; a chair that rolls backward
+    heads the other way.
+    """
+    if not {"position.x", "position.y"} <= set(run.trial.channels):
+        return None
+    (time, x), (when, y) = (run.trial.samples(f"position.{axis}") for axis in "xy")
+    x, y = x - x[:5].mean(), np.interp(time, when, y) - y[:5].mean()
+    far = np.flatnonzero(np.hypot(x, y) > CHORD)
+    if not far.size:
+        return None
+    k = int(far[0])
+    back = np.pi if _rolls(run) < 0.0 else 0.0
+    turned = _yaw_rate(run) * (time[k] - time[0])
+    return float(np.angle(np.exp(1j * (np.arctan2(y[k], x[k]) - 0.5 * turned + back))))
+
+
+def _rolls(run: Run) -> float:
+    """Mean of what the first wheel with a channel turns, forward positive; 1 where none has."""
+    for side in ("left", "right"):
+        if f"{side}_wheel_speed" in run.trial.channels:
+            return float(np.mean(run.trial.samples(f"{side}_wheel_speed")[1]))
+        if f"{side}_wheel_angle" in run.trial.channels:
+            angle = run.trial.samples(f"{side}_wheel_angle")[1]
+            return float(angle[-1] - angle[0])
+    return 1.0
 
 
 def _value(run: Run, channel: str, given: float | None) -> float | None:
@@ -82,7 +119,8 @@ def _speed(run: Run) -> float:
         return float(np.mean(seen))
     x, y = _first(run, "position.x"), _first(run, "position.y")
     if x is not None and y is not None:
-        heading = _value(run, "heading", run.initial.heading) or float(np.arctan2(y[1], x[1]))
+        known = initial_heading(run)
+        heading = float(np.arctan2(y[1], x[1])) if known is None else known
         return float(x[1] * np.cos(heading) + y[1] * np.sin(heading))
     return _speed_from_acceleration(run)
 

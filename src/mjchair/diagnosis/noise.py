@@ -65,12 +65,21 @@ def floor(channel: str) -> float:
 
 
 def estimate(study: Study) -> dict[str, Noise]:
-    """Noise of every channel, from the study's tables."""
+    """Noise of every channel, from the runs that are fitted to.
+
+    Runs that are held out tell nothing, but for a channel that no other run has.
+    """
     return {c: _channel(study, c) for c in study.channels}
 
 
+def telling(study: Study, channel: str) -> tuple[int, ...]:
+    """Indices of the runs that tell the noise of a channel."""
+    have = tuple(i for i, run in enumerate(study.runs) if channel in run.trial.channels)
+    return tuple(i for i in have if i in study.fitted) or have
+
+
 def _channel(study: Study, channel: str) -> Noise:
-    pieces = [r.trial.samples(channel) for r in study.runs if channel in r.trial.channels]
+    pieces = [study.runs[i].trial.samples(channel) for i in telling(study, channel)]
     values = [np.unwrap(v) if channel.endswith("heading") else v for _, v in pieces]
     steps = [float(np.median(np.diff(t))) for t, _ in pieces if t.size > 1]
     step = float(np.median(steps or [0.01]))
@@ -118,9 +127,7 @@ def _lattice(values: Array) -> float:
 def _still(study: Study, channel: str) -> tuple[float, float] | None:
     """Scatter and lag-one correlation where the chair stands still; None: it never does."""
     found = []
-    for run in study.runs:
-        if channel not in run.trial.channels:
-            continue
+    for run in (study.runs[i] for i in telling(study, channel)):
         for stretch in _still_rows(run.trial.time, run.trial.channels):
             v = run.trial.channels[channel][stretch]
             v = v[~np.isnan(v)]
@@ -174,9 +181,12 @@ def refined(shooter, track, known: dict[str, Noise]) -> dict[str, Noise]:  # typ
     from mjchair.diagnosis.shooting import residual
 
     pieces: dict[str, list[Array]] = {c: [] for c in shooter.channels}
+    tells = {c: telling(shooter.study, c) for c in shooter.channels}
     for i, w in enumerate(shooter.windows):
         miss = residual(shooter.measured(w), track.predicted[i], shooter.channels)
         for k, channel in enumerate(shooter.channels):
+            if w.run not in tells[channel]:
+                continue
             r = miss[:, k][~np.isnan(miss[:, k])]
             if r.size >= 30:
                 pieces[channel].append(_fast(r, w.last - w.first))

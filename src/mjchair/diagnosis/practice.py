@@ -12,15 +12,16 @@ from pathlib import Path
 
 import numpy as np
 
+from mjchair.effects import own
 from mjchair.effects.effect import Effect
 from mjchair.errors import MjchairError
 from mjchair.model.spec import load_spec
 from mjchair.simulation.inputs import Inputs, push_strokes
 from mjchair.simulation.recording import Recording
 from mjchair.simulation.simulate import simulate
-from mjchair.storage import write_whole
 
 SEAL = "answer.sealed"
+HELD_OUT = "slalom"  # the manoeuvre that no fit sees
 RATE, SECONDS = 100.0, 6.0  # Hz, s
 NOISE = {  # SI; sizes of encoders, a small IMU and motion capture; assumed
     "left_wheel_speed": 0.05,
@@ -39,13 +40,20 @@ def _slalom() -> Inputs:
     return Inputs(time, {"left_wheel": 2.0 + swing, "right_wheel": 2.0 - swing}, "slalom")
 
 
+def _turn() -> Inputs:
+    """Torque that holds a yaw rate of about 0.6 rad/s against the tires' scrub."""
+    time = np.arange(0.0, SECONDS, 0.01)
+    one = np.ones(time.size)
+    return Inputs(time, {"left_wheel": -3.0 * one, "right_wheel": 6.5 * one}, "turn")
+
+
 def runs() -> list[tuple[str, dict[str, object], Inputs | None]]:
     """The manoeuvres: word, how it starts, what drives it."""
     strokes = push_strokes({"left_wheel": 12.0, "right_wheel": 12.0}, SECONDS)
     return [
         ("coast", {"speed": 1.8, "heading": 0.0, "position": (0.0, 0.0)}, None),
         ("coast", {"speed": 1.4, "heading": np.pi, "position": (6.0, 0.0)}, None),
-        ("turn", {"speed": 1.3, "heading": 0.5, "yaw_rate": 0.5}, None),
+        ("turn", {"speed": 1.0, "heading": 0.5, "yaw_rate": 0.6}, _turn()),
         ("push", {"speed": 0.8, "heading": 1.2}, strokes),
         ("slalom", {"speed": 1.0, "heading": -0.6}, _slalom()),
     ]
@@ -53,18 +61,21 @@ def runs() -> list[tuple[str, dict[str, object], Inputs | None]]:
 
 def hide(
     effect: Effect,
-    folder: Path,
     values: Mapping[str, float] | None = None,
     seed: int = 0,
     model: str = "manual",
-) -> None:
-    """Write a study with the effect hidden in it, and the sealed answer.
+) -> dict[str, str | bytes]:
+    """The files of a study with the effect hidden in it, and the sealed answer.
 
     Args:
-      values: parameters; None: typical ones. seed: of noise and of what is only roughly known.
+      values: parameters; None: typical ones. seed: of the noise.
+
+    Returns:
+      File name -> content.
 
     Raises:
-      MjchairError: a sensor effect of a channel that is not written, or values out of bounds.
+      MjchairError: a sensor effect of a channel that is not written, values out of bounds, or an
+        effect whose edit fails.
     """
     rng = np.random.default_rng(seed)
     chosen = dict(values) if values else _typical(effect)
@@ -73,19 +84,23 @@ def hide(
             f"a practice study has no channel {effect.channel}; it has {', '.join(NOISE)}"
         )
     spec = load_spec(model)
+    own.check(effect, spec)
     effect.apply(spec, chosen)
+    files: dict[str, str | bytes] = {}
     lines = [f'model = "{model}"', 'scene = "flat"', "", "[noise]"]
     lines += [f'"{name}" = {std}' for name, std in NOISE.items()]
     for k, (word, initial, inputs) in enumerate(runs()):
         recording = simulate(
             spec, inputs, SECONDS, initial=initial, timestep=0.001, sample_rate=RATE
         )
-        file = f"{word}_{k}.csv"
-        write_whole(folder / file, _table(recording, inputs, rng))
-        lines += ["", "[[trial]]", f'file = "{file}"', f'manoeuvre = "{word}"']
-    write_whole(folder / "study.toml", "\n".join(lines) + "\n")
+        files[f"{word}_{k}.csv"] = _table(recording, inputs, rng)
+        lines += ["", "[[trial]]", f'file = "{word}_{k}.csv"', f'manoeuvre = "{word}"']
+        if word == HELD_OUT:
+            lines.append("hold_out = true")
+    files["study.toml"] = "\n".join(lines) + "\n"
     answer = json.dumps({"effect": effect.name, "channel": effect.channel, "values": chosen})
-    write_whole(folder / SEAL, base64.b64encode(zlib.compress(answer.encode())))
+    files[SEAL] = base64.b64encode(zlib.compress(answer.encode()))
+    return files
 
 
 def reveal(folder: Path) -> dict[str, object]:

@@ -80,24 +80,11 @@ def predictions(
     late: float = 0.0,
 ) -> Column:
     """What a model predicts from the states of a track, with its inputs `late` (s)."""
-    key = ""
-    if shooter.store is not None:
-        states = [np.r_[s.qpos, s.qvel, s.act] for s in track.states]
-        times = [w.rows.astype(float) for w in shooter.windows]
-        inputs = [shooter.controls(model, w, shooter.steps, late) for w in shooter.windows]
-        sensed = repr((observer.channels, observer.bias, observer.scale, observer.delay, late))
-        key = shooter.store.key(model, [*states, *times, *inputs, sensed])
-        kept = shooter.store.load(key)
-        if kept is not None:
-            return kept
     jobs = [Job(model, w, s, late=late) for w, s in zip(shooter.windows, track.states, strict=True)]
-    out = [
+    return [
         observer.observe(shooter, w, o.predicted)
         for w, o in zip(shooter.windows, shooter.run(jobs), strict=True)
     ]
-    if shooter.store is not None:
-        shooter.store.save(key, out)
-    return out
 
 
 def _unwrapped(shooter: Shooter, column: Column) -> Column:

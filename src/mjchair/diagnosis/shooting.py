@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import mujoco
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from mjchair.diagnosis.chair import Chair, Rest, State
-from mjchair.diagnosis.store import Store
+from mjchair.diagnosis.store import Part, Store, digest
 from mjchair.diagnosis.study import Run, Study
 from mjchair.diagnosis.windows import Window, cut
 from mjchair.effects import rider_sway
@@ -85,6 +85,7 @@ class Shooter:
         self._places: dict[int, list[int]] = {}
         self._rests: dict[bytes, Rest] = {}
         self.motions = [_motion(run) for run in study.runs]
+        self.studied = digest(part for run in study.runs for part in _given(run))
 
     def _coarse_step(self) -> float:
         """Twice the step where the tires allow it: enough for differences of two simulations."""
@@ -154,7 +155,30 @@ class Shooter:
         return out
 
     def run(self, jobs: Sequence[Job], trace: bool = False) -> list[Outcome]:
-        """Simulate the jobs; equal model sizes go together."""
+        """Simulate the jobs, or load what the store kept of them; traces are not kept."""
+        if self.store is None or trace:
+            return self._simulate(jobs, trace)
+        key = self._key(jobs, self.store)
+        found = self.store.load(key)
+        if found is None:
+            found = [outcome.predicted for outcome in self._simulate(jobs, trace)]
+            self.store.save(key, found)
+        return [Outcome(predicted) for predicted in found]
+
+    def _key(self, jobs: Sequence[Job], store: Store) -> str:
+        """Digest of all that the jobs' predictions follow from."""
+        parts: list[Part] = [self.studied, self.steps, self.step, *self.channels]
+        models = {id(job.model): job.model for job in jobs}
+        places = {name: k for k, name in enumerate(models)}
+        for job in jobs:
+            w, state = job.window, job.state
+            parts += [places[id(job.model)], job.late, w.run, w.start, w.rows]
+            parts += [state.qpos, state.qvel, state.act]
+            parts.append(job.force if job.force is not None else "free")
+        return store.key(models.values(), parts)
+
+    def _simulate(self, jobs: Sequence[Job], trace: bool) -> list[Outcome]:
+        """Equal model sizes go together."""
         outcomes: list[Outcome | None] = [None] * len(jobs)
         groups: dict[tuple[object, ...], list[int]] = {}
         for i, job in enumerate(jobs):
@@ -283,6 +307,18 @@ class Shooter:
             place = [found.get(c, short.get(c, 0)) for c in self.channels]
             self._places[model.nsensordata] = place
         return self._places[model.nsensordata]
+
+
+def _given(run: Run) -> Iterator[Part]:
+    """What of a run its simulation follows from: times, inputs, the rider's motion."""
+    trial = run.trial
+    yield trial.time
+    if trial.inputs is not None:
+        yield trial.inputs.time
+    for columns in (trial.inputs.controls if trial.inputs is not None else {}, trial.other):
+        for name, values in columns.items():
+            yield name
+            yield values
 
 
 def residual(measured: Array, predicted: Array, channels: Sequence[str]) -> Array:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+import zipfile
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,6 +15,15 @@ from numpy.typing import NDArray
 from mjchair.storage import whole
 
 Array = NDArray[np.float64]
+Part = NDArray[Any] | str | float
+
+
+def digest(parts: Iterable[Part]) -> str:
+    """A name for what the parts are, in this order."""
+    found = hashlib.sha256()
+    for part in parts:
+        found.update(part.tobytes() if isinstance(part, np.ndarray) else repr(part).encode())
+    return found.hexdigest()[:32]
 
 
 class Store:
@@ -24,15 +35,13 @@ class Store:
         folder.mkdir(parents=True, exist_ok=True)
 
     @staticmethod
-    def key(model: mujoco.MjModel, parts: Sequence[Array | str | float]) -> str:
-        """Digest of a model and of arrays, numbers and text."""
-        digest = hashlib.sha256(mujoco.__version__.encode())
-        buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
-        mujoco.mj_saveModel(model, None, buffer)
-        digest.update(buffer.tobytes())
-        for part in parts:
-            digest.update(part.tobytes() if isinstance(part, np.ndarray) else repr(part).encode())
-        return digest.hexdigest()[:32]
+    def key(models: Iterable[mujoco.MjModel], parts: Iterable[Part]) -> str:
+        """Digest of models and of arrays, numbers and text."""
+        saved = []
+        for model in models:
+            saved.append(np.empty(mujoco.mj_sizeModel(model), np.uint8))
+            mujoco.mj_saveModel(model, None, saved[-1])
+        return digest([mujoco.__version__, *saved, *parts])
 
     def load(self, key: str) -> list[Array] | None:
         """The arrays that were kept, or None."""
@@ -42,8 +51,8 @@ class Store:
         try:
             with np.load(path, allow_pickle=False) as data:
                 return [data[f"w{i}"] for i in range(len(data.files))]
-        except (OSError, ValueError, KeyError):
-            return None
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+            return None  # cut short: it is made again
 
     def save(self, key: str, arrays: Sequence[Array]) -> None:
         """Keep arrays, whole or not at all."""

@@ -5,23 +5,23 @@ from __future__ import annotations
 import os
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from mjchair.diagnosis import plausible
+from mjchair.diagnosis import ingest, plausible
 from mjchair.errors import MjchairError, nearest
+from mjchair.measurement import smartwheel
 from mjchair.measurement.trial import Trial, read_trial
 from mjchair.model.spec import load_spec
 from mjchair.simulation.initial import Initial, as_initial
 
 FILE = "study.toml"
 KEYS = ("model", "scene", "grade", "noise", "nuisance", "trial", "kind")
-TRIAL_KEYS = ("file", "manoeuvre", "hold_out", "initial")
-SHORTEST = 1.0  # s, of a trial: less holds no window
+TRIAL_KEYS = ("file", "manoeuvre", "hold_out", "initial", "smartwheel", "baseline")
 
 
 @dataclass(frozen=True)
@@ -96,12 +96,13 @@ def read_study(folder: str | os.PathLike[str]) -> Study:
     if table.get("kind") == "rig":
         raise MjchairError(f"{path} is a rig study; fit its tire with `mjchair fit-tire`")
     spec = _spec(table, path)
-    runs, notes = _runs(table, path, spec.copy().compile())
-    noise = _positive(table.get("noise", {}), "noise", path)
+    runs = _runs(table, path, spec.copy().compile())
+    notes: list[str] = []
+    noise = _positive(table, "noise", path)
     for channel in noise:
-        if not any(channel in run.trial.channels for run in runs):
+        if not any(channel in (c, c.rsplit(".", 1)[0]) for run in runs for c in run.trial.channels):
             notes.append(f"noise of {channel} is given, and no run measures it")
-    nuisance = _positive(table.get("nuisance", {}), "nuisance", path)
+    nuisance = _positive(table, "nuisance", path)
     return make_study(spec, runs, noise, nuisance, notes, str(path.parent))
 
 
@@ -120,54 +121,132 @@ def make_study(
     """
     if not runs:
         raise MjchairError(f"{source}: no trial; a study needs at least one [[trial]]")
-    for run in runs:
-        if run.duration < SHORTEST:
-            raise MjchairError(
-                f"{source}: trial {run.trial.name} lasts {run.duration:.2g} s; "
-                f"it must last at least {SHORTEST:g} s, which is one window"
-            )
     if all(run.hold_out for run in runs):
         raise MjchairError(f"{source}: every trial is held out; leave at least one to fit to")
-    said = list(notes or [])
+    checked, said = [], list(notes or [])
     for run in runs:
-        said += plausible.check(run.trial)
-    return Study(spec, tuple(runs), dict(noise or {}), dict(nuisance or {}), tuple(said), source)
+        trial, noticed = _checked(run.trial)
+        checked.append(replace(run, trial=trial))
+        said += noticed
+    said += _without_heading(checked)
+    return Study(spec, tuple(checked), dict(noise or {}), dict(nuisance or {}), tuple(said), source)
+
+
+def _without_heading(runs: list[Run]) -> list[str]:
+    """A note on the runs of which nothing tells where in the world they head."""
+    tells = ({"heading"}, {"position.x", "position.y"})
+    blind = [
+        run.trial.name
+        for run in runs
+        if "heading" not in run.given and not any(t <= set(run.trial.channels) for t in tells)
+    ]
+    if not blind:
+        return []
+    return [
+        f"the heading of {', '.join(blind)} is neither measured nor given; each is taken to start "
+        "at heading 0, and a slope or a wind is one along or across that"
+    ]
+
+
+def _checked(trial: Trial) -> tuple[Trial, list[str]]:
+    """The trial as it is used, and what was noticed."""
+    said = []
+    for stage in (ingest.measured_part, ingest.without_dead, ingest.other_side):
+        trial, noticed = stage(trial)
+        said += noticed
+    ingest.check(trial)
+    plausible.check(trial)
+    return trial, said
 
 
 def _spec(table: Mapping[str, Any], path: Path) -> mujoco.MjSpec:
-    model = str(table.get("model", "manual"))
+    model = _typed(table, "model", str, "manual", path)
+    grade = _typed(table, "grade", float, None, path)
     near = path.parent / model
-    grade = float(table["grade"]) if "grade" in table else None
-    found = near if near.is_file() else model
-    return load_spec(found, table.get("scene", "flat"), grade=grade)
+    return load_spec(
+        near if near.is_file() else model, _typed(table, "scene", str, "flat", path), grade=grade
+    )
 
 
-def _runs(
-    table: Mapping[str, Any], path: Path, model: mujoco.MjModel
-) -> tuple[list[Run], list[str]]:
+def _runs(table: Mapping[str, Any], path: Path, model: mujoco.MjModel) -> list[Run]:
     runs: list[Run] = []
-    notes: list[str] = []
-    for entry in table.get("trial", []):
+    for entry in _typed(table, "trial", list, [], path):
         _known(entry, TRIAL_KEYS, path)
-        if "file" not in entry:
-            raise MjchairError(f"{path}: a [[trial]] has no file; name its table")
-        trial = read_trial(path.parent / str(entry["file"]), model)
-        trial, said = plausible.without_dead(trial)
-        notes += said
-        given = dict(entry.get("initial", {}))
+        trial = _trial(entry, path, model)
+        twin = next((r.trial.name for r in runs if _same(trial, r.trial)), None)
+        if twin is not None:
+            raise MjchairError(
+                f"{path}: trial {trial.name} holds the samples of {twin} again; keep one"
+            )
+        given = dict(_typed(entry, "initial", dict, {}, path))
+        plausible.check_initial(given, trial.name)
         runs.append(
             Run(
                 trial,
-                str(entry.get("manoeuvre", "run")),
-                bool(entry.get("hold_out", False)),
-                as_initial(given),
+                _typed(entry, "manoeuvre", str, "run", path),
+                _typed(entry, "hold_out", bool, False, path),
+                _initial(given, path),
                 frozenset(given),
             )
         )
-    return runs, notes
+    return runs
+
+
+def _trial(entry: Mapping[str, Any], path: Path, model: mujoco.MjModel) -> Trial:
+    """The table of one [[trial]], or the recording of an instrumented wheel."""
+    file = _typed(entry, "file", str, "", path)
+    if not file:
+        raise MjchairError(f"{path}: a [[trial]] has no file; name its table")
+    side = _typed(entry, "smartwheel", str, None, path)
+    baseline = _typed(entry, "baseline", str, None, path)
+    if side is None:
+        if baseline is not None:
+            raise MjchairError(f'{path}: baseline goes with smartwheel = "left" or "right"')
+        return read_trial(path.parent / file, model)
+    if side not in ("left", "right"):
+        raise MjchairError(f"{path}: smartwheel {side!r}" + nearest(side, ("left", "right")))
+    run = smartwheel.read_smartwheel(path.parent / file)
+    still = smartwheel.read_smartwheel(path.parent / baseline) if baseline else None
+    return smartwheel.as_trial(smartwheel.without_baseline(run, still), side, Path(file).stem)
+
+
+def _same(one: Trial, two: Trial) -> bool:
+    return (
+        np.array_equal(one.time, two.time)
+        and set(one.channels) == set(two.channels)
+        and all(np.array_equal(v, two.channels[n], equal_nan=True) for n, v in one.channels.items())
+    )
+
+
+def _initial(given: Mapping[str, Any], path: Path) -> Initial:
+    for name, value in given.items():
+        numbers = value if isinstance(value, list) else [value]
+        if any(isinstance(v, bool) or not isinstance(v, int | float) for v in numbers):
+            raise MjchairError(f"{path}: initial {name} is {value!r}; it must be a number")
+    return as_initial(given)
+
+
+KINDS = {str: "text", float: "a number", bool: "true or false", list: "[[trial]]", dict: "a table"}
+
+
+def _typed(table: Mapping[str, Any], key: str, kind: type, default: Any, path: Path) -> Any:
+    """The value of a key, if it is of its kind.
+
+    Raises:
+      MjchairError: it is not.
+    """
+    if key not in table:
+        return default
+    value = table[key]
+    right = isinstance(value, kind) or (kind is float and isinstance(value, int))
+    if not right or (isinstance(value, bool) and kind is not bool):
+        raise MjchairError(f"{path}: {key} is {value!r}; it must be {KINDS[kind]}")
+    return value
 
 
 def _known(table: Mapping[str, Any], known: tuple[str, ...], path: Path) -> None:
+    if not isinstance(table, Mapping):
+        raise MjchairError(f"{path}: a trial is {table!r}; it must be a [[trial]] with a file")
     for key in table:
         if key not in known:
             raise MjchairError(f"{path}: unknown key {key!r}" + nearest(key, known))
@@ -175,8 +254,9 @@ def _known(table: Mapping[str, Any], known: tuple[str, ...], path: Path) -> None
 
 def _positive(table: Mapping[str, Any], what: str, path: Path) -> dict[str, float]:
     out = {}
-    for name, value in table.items():
-        if not isinstance(value, int | float) or not np.isfinite(value) or value <= 0.0:
+    for name, value in _typed(table, what, dict, {}, path).items():
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not np.isfinite(value) or value <= 0.0:
             raise MjchairError(f"{path}: {what} of {name} is {value!r}; it must be positive")
         out[name] = float(value)
     return out

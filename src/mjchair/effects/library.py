@@ -1,11 +1,8 @@
-"""The library of effects, and effects from a user's own file."""
+"""The library of effects."""
 
 from __future__ import annotations
 
-import importlib.util
-import os
 from collections.abc import Iterable
-from pathlib import Path
 
 from mjchair.effects import (
     air_drag,
@@ -92,26 +89,11 @@ def find(name: str, channel: str | None = None) -> Effect:
     if name in SENSORS:
         if not channel:
             raise MjchairError(f"{name} needs a channel, such as {name}:imu_gyro.z")
-        return sensor_effects(channel)[SENSORS.index(name)]
+        for effect in sensor_effects(channel):
+            if effect.name == name:
+                return effect
+        raise MjchairError(f"{channel} has no {name}; MuJoCo delays no sensor of a tire")
     for effect in (*MECHANICAL, rider_sway.HARMONIC):
         if effect.name == name:
             return effect
     raise MjchairError(f"unknown effect {name!r}" + nearest(name, names()))
-
-
-def from_file(path: str | os.PathLike[str]) -> Effect:
-    """The `EFFECT` of a Python file.
-
-    Raises:
-      MjchairError: no such file, or no Effect named EFFECT in it.
-    """
-    file = Path(path)
-    described = importlib.util.spec_from_file_location(file.stem, file)
-    if not file.is_file() or described is None or described.loader is None:
-        raise MjchairError(f"no effect file {file}; give a Python file with an EFFECT")
-    module = importlib.util.module_from_spec(described)
-    described.loader.exec_module(module)
-    effect = getattr(module, "EFFECT", None)
-    if not isinstance(effect, Effect):
-        raise MjchairError(f"{file} has no EFFECT that is an mjchair Effect")
-    return effect

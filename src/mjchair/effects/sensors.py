@@ -78,41 +78,40 @@ def _delay(channel: str) -> Callable[..., None]:
         name, _ = split(channel)
         sensor = parts.named(spec.sensors, name, "sensor")
         if sensor.type == mujoco.mjtSensor.mjSENS_USER:
-            raise MjchairError(f"MuJoCo delays no user sensor, and {name} is one")
+            _lag(spec, channel, delay)
+            return
         sensor.delay += delay
         sensor.nsample = int(np.ceil(sensor.delay / spec.option.timestep)) + 2
 
     return edit
 
 
+def _lag(spec: mujoco.MjSpec, channel: str, delay: float) -> None:
+    """Delay a heading in mjchair's own sensor, since MuJoCo delays no user sensor."""
+    sensor, data, _ = _block(spec, channel)
+    if data[wheel.SENSOR_KIND] != wheel.HEADING:
+        raise MjchairError(f"{channel} cannot be delayed; MuJoCo delays no user sensor")
+    data = np.r_[data, np.zeros(max(0, wheel.SENSOR_LAG + 1 - data.size))]
+    data[wheel.SENSOR_LAG] += delay
+    parts.write_sensor(spec, sensor, data)
+
+
 def sensor_effects(channel: str) -> tuple[Effect, ...]:
-    """sensor_bias, sensor_scale and sensor_delay of one scalar channel."""
+    """sensor_bias, sensor_scale and sensor_delay of one scalar channel.
+
+    A tire's sensor has no delay: MuJoCo delays no user sensor, so the chair could not show it.
+    """
     typical, unit = size(channel)
     one = "one channel only, and no force is consistent with it"
     source = "sizes of uncalibrated sensors; assumed"
-    return (
-        Effect(
-            "sensor_bias",
-            (Parameter("bias", unit, typical, -1e3 * typical, 1e3 * typical),),
-            one,
-            source,
-            _bias(channel),
-            channel,
-        ),
-        Effect(
-            "sensor_scale",
-            (Parameter("scale", "1", 0.05, -0.9, 9.0),),
-            one,
-            source,
-            _scale(channel),
-            channel,
-        ),
-        Effect(
-            "sensor_delay",
-            (Parameter("delay", "s", 0.02, 0.0, 0.5),),
-            one + "; its lag grows with the rate of change",
-            source,
-            _delay(channel),
-            channel,
-        ),
-    )
+    bias = Parameter("bias", unit, typical, -1e3 * typical, 1e3 * typical)
+    scale = Parameter("scale", "1", 0.05, -0.9, 9.0)
+    delay = Parameter("delay", "s", 0.02, 0.0, 0.5)
+    lags = one + "; its lag grows with the rate of change"
+    found = [
+        Effect("sensor_bias", (bias,), one, source, _bias(channel), channel),
+        Effect("sensor_scale", (scale,), one, source, _scale(channel), channel),
+    ]
+    if not split(channel)[0].endswith("_tire"):
+        found.append(Effect("sensor_delay", (delay,), lags, source, _delay(channel), channel))
+    return tuple(found)

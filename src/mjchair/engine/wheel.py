@@ -35,6 +35,7 @@ SENSOR_USER = int(mjtSensor.mjSENS_USER)
 SENSOR_TAG = 5066323.0  # "MJS": what follows is the kind, then a bias and a scale per component
 SENSOR_KIND = 1
 SENSOR_BIAS = 2
+SENSOR_LAG = 4  # of a heading, s: it is shown as it was so long ago, had it turned evenly
 PLAIN, HEADING = range(2)
 
 
@@ -236,7 +237,11 @@ def sense(m, d):
         user = m.sensor_user
         if user[i, SENSOR_KIND] == HEADING:
             site = m.sensor_objid[i]
-            d.sensordata[adr] = math.atan2(d.site_xmat[site, 3], d.site_xmat[site, 0])
+            heading = math.atan2(d.site_xmat[site, 3], d.site_xmat[site, 0])
+            if user.shape[1] > SENSOR_LAG and user[i, SENSOR_LAG] != 0.0:
+                heading -= user[i, SENSOR_LAG] * d.cvel[m.site_bodyid[site], 2]
+                heading = math.atan2(math.sin(heading), math.cos(heading))
+            d.sensordata[adr] = heading
         for k in range(m.sensor_dim[i]):
             at = SENSOR_BIAS + 2 * k
             if at + 1 < user.shape[1]:

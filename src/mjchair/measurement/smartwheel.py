@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from mjchair.errors import MjchairError
+from mjchair.measurement.trial import Trial
 from mjchair.simulation.inputs import Inputs
 from mjchair.simulation.table import frozen
 
@@ -187,3 +189,14 @@ def push_inputs(run: PushRim) -> Inputs:
     """
     torque = run.torque
     return Inputs(run.time, {"left_wheel": torque, "right_wheel": torque}, run.source)
+
+
+def as_trial(run: PushRim, side: str, name: str) -> Trial:
+    """The recording as a measured run: angle (rad) and torque (N m) of the wheel of that side."""
+    return Trial(
+        name=name,
+        time=run.time,
+        channels=MappingProxyType({f"{side}_wheel_angle": run.angle}),
+        inputs=Inputs(run.time, {f"{side}_wheel": run.torque}, run.source),
+        other=MappingProxyType({}),
+    )

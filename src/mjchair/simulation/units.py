@@ -25,6 +25,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "N": ("N", 1.0),
     "N m": ("N m", 1.0),
     "Nm": ("N m", 1.0),
+    "N mm": ("N m", 1e-3),
     "1": ("1", 1.0),
 }
 

@@ -1,0 +1,223 @@
+"""Studies that cannot be right: one line says what, exit code 2, and nothing is written."""
+
+import re
+
+import numpy as np
+import pytest
+
+from mjchair import cli
+
+TIME = np.round(np.arange(0.0, 4.0, 0.02), 6)
+EMPTY = np.full(TIME.size, np.nan)
+HEAD = 'model = "manual"\n'
+PUSH = 1.0 + np.sin(2.0 * np.pi * TIME)  # m/s, with strokes
+PULL = 2.0 * np.pi * np.cos(2.0 * np.pi * TIME)  # m/s^2, that goes with it
+
+
+def coast(speed=3.0, turn=0.0):
+    """Wheel speeds (rad/s) of a chair that slows down, and turns (rad/s)."""
+    rolls = speed - 0.1 * speed * TIME
+    return {
+        "left_wheel_speed": rolls - turn * 0.28 / 0.3,
+        "right_wheel_speed": rolls + turn * 0.28 / 0.3,
+    }
+
+
+def table(columns, time=TIME):
+    """The text of a table; NaN becomes an empty cell."""
+    rows = [",".join(["time", *columns])]
+    for k, t in enumerate(time):
+        cells = (t, *(c[k] for c in columns.values()))
+        rows.append(",".join("" if np.isnan(v) else repr(float(v)) for v in cells))
+    return "\n".join(rows) + "\n"
+
+
+def write(folder, columns, trial="", head=HEAD, time=TIME, file='"a.csv"', kind="[[trial]]"):
+    """A study of one table."""
+    folder.mkdir()
+    (folder / "a.csv").write_text(table(columns, time))
+    (folder / "study.toml").write_text(f"{head}{kind}\nfile = {file}\n{trial}")
+
+
+def cut(values, first, last):
+    """A column without its samples outside two times (s)."""
+    return np.where((first <= TIME) & (last >= TIME), values, np.nan)
+
+
+def hole(values, first, last):
+    """A column without its samples between two times (s)."""
+    return np.where((first < TIME) & (last > TIME), np.nan, values)
+
+
+TORQUE = np.full(TIME.size, 4.0)
+DRIVEN = coast() | {"left_wheel": TORQUE, "right_wheel": TORQUE}
+# name -> what is written, and what the line says
+CASES = {
+    "missing table": ({"columns": coast(), "file": '"b.csv"'}, "no file .*b.csv; did you mean"),
+    "too short": ({"columns": {"left_wheel_speed": np.ones(20)}, "time": TIME[:20]}, "one window"),
+    "one sample": ({"columns": {"left_wheel_speed": np.ones(1)}, "time": TIME[:1]}, "lasts 0 s"),
+    "no sample": ({"columns": {"left_wheel_speed": np.ones(0)}, "time": TIME[:0]}, "no samples"),
+    "inputs begin late": (
+        {"columns": DRIVEN | {"left_wheel": cut(TORQUE, 1.0, 9.0)}},
+        "left_wheel is there from 1 to 3.98 s, and the run lasts from 0 to 3.98 s; write 0",
+    ),
+    "inputs end early": (
+        {"columns": DRIVEN | {"right_wheel": cut(TORQUE, 0.0, 3.0)}},
+        "right_wheel is there from 0 to 3 s",
+    ),
+    "inputs with a hole": (
+        {"columns": DRIVEN | {"left_wheel": hole(TORQUE, 1.0, 2.0)}},
+        "left_wheel is not there from 1 to 2 s",
+    ),
+    "every channel zero": ({"columns": coast(0.0)}, "every channel is zero throughout"),
+    "a column without samples": (
+        {"columns": coast() | {"imu_gyro.z": EMPTY}},
+        "imu_gyro.z has no samples; leave the column out",
+    ),
+    "clock jumps": (
+        {"columns": coast(), "time": np.where(TIME > 2.0, TIME + 5.0, TIME)},
+        "the clock jumps from 2 to 7.02 s; cut the trial in two",
+    ),
+    "clock goes back": (
+        {"columns": coast(), "time": np.where(TIME > 2.0, TIME - 1.0, TIME)},
+        "time goes from 2 to 1.02 s in sample 102",
+    ),
+    "a time twice": (
+        {"columns": coast(), "time": np.where(TIME == 2.0, 1.98, TIME)},
+        "time goes from 1.98 to 1.98 s in sample 101",
+    ),
+    "a clock in ms": (
+        {"columns": coast(), "time": 1000.0 * TIME},
+        r"a sample comes every 20 s; .* is it in ms\? name it time \[ms\]",
+    ),
+    "fewer samples than a window holds": (
+        {"columns": {n: v[::25] for n, v in coast().items()}, "time": TIME[::25]},
+        "a sample comes every 0.5 s; .* sample it faster",
+    ),
+    "a wheel in degrees": (
+        {"columns": coast() | {"left_wheel_speed": coast()["left_wheel_speed"] * 57.3}},
+        "left_wheel_speed looks like degrees",
+    ),
+    "both wheels in degrees": (
+        {"columns": {n: v * 57.3 for n, v in coast().items()}},
+        "wheel_speed looks like degrees: it reaches",
+    ),
+    "one slow wheel in degrees": (
+        {"columns": coast(0.5) | {"left_wheel_speed": coast(0.5)["left_wheel_speed"] * 57.3}},
+        "left_wheel_speed looks like degrees: it tells 57.3 times what right_wheel_speed does",
+    ),
+    "the only channel in degrees": (
+        {"columns": {"left_wheel_speed": coast()["left_wheel_speed"] * 57.3}},
+        "left_wheel_speed looks like degrees",
+    ),
+    "slow wheels in degrees beside an accelerometer": (
+        {
+            "columns": {
+                "left_wheel_speed": 57.3 * 0.08 * PUSH / 0.3,
+                "imu_accelerometer.x": 0.08 * PULL,
+            }
+        },
+        "left_wheel_speed looks like degrees: its speed changes 5[78]",
+    ),
+    "a wheel's angle in degrees": (
+        {"columns": {"left_wheel_angle": 57.3 * 3.0 * TIME}},
+        "left_wheel_angle looks like degrees",
+    ),
+    "a gyroscope in degrees": (
+        {"columns": coast(turn=0.5) | {"imu_gyro.z": np.full(TIME.size, 0.5 * 57.3)}},
+        "imu_gyro.z looks like degrees",
+    ),
+    "a slow gyroscope in degrees": (
+        {"columns": coast(turn=0.1) | {"imu_gyro.z": np.full(TIME.size, 0.1 * 57.3)}},
+        "imu_gyro.z looks like degrees: it tells 57.3 times what the difference of the wheels",
+    ),
+    "a heading in degrees": (
+        {"columns": coast() | {"heading": np.full(TIME.size, 90.0) + 0.1 * TIME}},
+        "heading looks like degrees: it begins at 90",
+    ),
+    "a turning heading in degrees": (
+        {"columns": coast(turn=0.1) | {"heading": 0.1 * TIME * 57.3}},
+        "heading looks like degrees",
+    ),
+    "a first heading in degrees": (
+        {"columns": coast(), "trial": "[trial.initial]\nheading = 90\n"},
+        "the initial heading looks like degrees: it is 90, .* give 1.571",
+    ),
+    "gravity in g": (
+        {"columns": coast() | {"imu_accelerometer.z": np.full(TIME.size, 1.01)}},
+        r"imu_accelerometer.z looks like g: it stays near 1.01, .* imu_accelerometer.z \[g\]",
+    ),
+    "gravity taken off": (
+        {"columns": coast() | {"imu_accelerometer.z": 0.1 * np.sin(TIME)}},
+        "imu_accelerometer.z looks as if gravity was taken off",
+    ),
+    "acceleration in g": (
+        {
+            "columns": {
+                "left_wheel_speed": PUSH / 0.3,
+                "imu_accelerometer.x": PULL / 9.81,
+            }
+        },
+        "imu_accelerometer.x looks like g: the wheels gain 9.. times",
+    ),
+    "torque in N mm": (
+        {"columns": DRIVEN | {"left_wheel": 1000.0 * TORQUE}},
+        r"left_wheel looks like N mm: it reaches 4000, .* left_wheel \[N mm\]",
+    ),
+    "all held out": ({"columns": coast(), "trial": "hold_out = true\n"}, "every trial is held out"),
+    "the same trial twice": (
+        {"columns": coast(), "trial": '[[trial]]\nfile = "a.csv"\n'},
+        "trial a holds the samples of a again",
+    ),
+    "a word for hold_out": ({"columns": coast(), "trial": 'hold_out = "no"\n'}, "true or false"),
+    "a word for a heading": (
+        {"columns": coast(), "trial": '[trial.initial]\nheading = "east"\n'},
+        "initial heading is 'east'; it must be a number",
+    ),
+    "a number for the file": ({"columns": coast(), "file": "3"}, "file is 3; it must be text"),
+    "no file": ({"columns": coast(), "file": '""'}, "has no file"),
+    "one [trial]": (
+        {"columns": coast(), "kind": "[trial]"},
+        r"trial is {'file': 'a.csv'}; it must be \[\[trial\]\]",
+    ),
+    "a trial that is a word": (
+        {"columns": coast(), "head": "", "kind": 'trial = ["a.csv"]\n[noise]', "file": "1.0"},
+        "a trial is 'a.csv'; it must be a ",
+    ),
+    "a number for the noise": ({"columns": coast(), "head": HEAD + "noise = 3\n"}, "a table"),
+    "no noise at all": (
+        {"columns": coast(), "head": HEAD + '[noise]\n"left_wheel_speed" = 0\n'},
+        "noise of left_wheel_speed is 0; it must be positive",
+    ),
+    "an unknown nuisance": (
+        {"columns": coast(), "head": HEAD + "[nuisance]\nmas = 0.1\n"},
+        "unknown nuisance 'mas'; did you mean 'mass'",
+    ),
+    "a word for the grade": (
+        {"columns": coast(), "head": HEAD + 'scene = "ramp"\ngrade = "steep"\n'},
+        "grade is 'steep'; it must be a number",
+    ),
+    "an unknown scene": (
+        {"columns": coast(), "head": HEAD + 'scene = "flatt"\n'},
+        "did you mean 'flat'",
+    ),
+    "another instrument": (
+        {"columns": coast(), "trial": 'smartwheel = "left"\n'},
+        "a SmartWheel file has 24",
+    ),
+    "a baseline of nothing": (
+        {"columns": coast(), "trial": 'baseline = "a.csv"\n'},
+        "baseline goes with smartwheel",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bad_studies_are_one_line_and_nothing_is_written(case, tmp_path, capsys):
+    written, words = CASES[case]
+    write(tmp_path / "study", **written)
+    assert cli.main(["diagnose", str(tmp_path / "study"), "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("mjchair: ") and said.count("\n") == 1, said
+    assert "Error" not in said and re.search(words, said), said
+    assert not (tmp_path / "out").exists()
