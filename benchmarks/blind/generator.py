@@ -438,8 +438,12 @@ LINEAR = {  # channel -> order of the polynomial that a free initial state takes
 }
 
 
-def apart(with_it: list[dict], without: list[dict]) -> np.ndarray:
-    """What two sets of exact runs differ by, over the noise, once each 2 s starts afresh, (n,)."""
+def apart(with_it: list[dict], without: list[dict], afresh: bool = True) -> np.ndarray:
+    """What two sets of exact runs differ by, over the noise, (n,).
+
+    Args:
+      afresh: each 2 s may start from another place and speed.
+    """
     out = []
     for a, b in zip(with_it, without, strict=True):
         n = len(next(iter(a.values())))
@@ -451,7 +455,7 @@ def apart(with_it: list[dict], without: list[dict]) -> np.ndarray:
                 if "heading" in name:
                     x = np.angle(np.exp(1j * x))
                 t = np.arange(x.size)
-                if order >= 0 and "caster" not in name:
+                if afresh and order >= 0 and "caster" not in name:
                     x = x - np.polyval(np.polyfit(t, x, order), t)
                 out.append(x / std)
     return np.concatenate(out)
@@ -516,7 +520,9 @@ def _size(case: Case, seed: int, trials: tuple[int, ...], seconds: float) -> Non
             else:
                 world = World(np.random.default_rng([seed, 2]), {name: case.hidden[name]})
                 exact = [run(world, man, seconds)[0] for man in chosen]
-            case.reached[name] = detectability(apart(exact, without), known)
+            # a place or speed that starts afresh for one channel alone is no motion
+            moves = not name.startswith("sensor")
+            case.reached[name] = detectability(apart(exact, without, moves), known)
             factor = case.sigma / max(case.reached[name], 1e-6)
             if 0.8 < factor < 1.25 or scaled(first, name, 1.2 * size) == case.hidden[name]:
                 break  # or at the largest size that it may have

@@ -56,7 +56,6 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 
 def run(args: argparse.Namespace) -> int:
     """Diagnose, write everything, and print the verdict on one line."""
-    from mjchair.diagnosis import shooting
     from mjchair.diagnosis.store import Store
     from mjchair.diagnosis.study import read_study
     from mjchair.diagnosis.workflow import diagnose
@@ -65,7 +64,6 @@ def run(args: argparse.Namespace) -> int:
 
     if args.threads < 1:
         raise MjchairError(f"--threads is {args.threads}; it must be at least 1")
-    shooting.THREADS = args.threads
     kept = Path(args.out) / CACHE
     force = args.force or _interrupted(kept)
     check_vacant(args.out, force)
@@ -76,7 +74,9 @@ def run(args: argparse.Namespace) -> int:
     folder = output_folder(args.out, force)
     try:
         with _progress() as say:
-            found = diagnose(study, effects=effects, say=say, store=Store(kept))
+            found = diagnose(
+                study, effects=effects, say=say, store=Store(kept), threads=args.threads
+            )
             say("report")
             _write(folder, kept, study, found)
     except MjchairError:

@@ -15,7 +15,7 @@ from mjchair.diagnosis.fitting import Bench, Fit, Fitted, nuisance_columns, refi
 from mjchair.diagnosis.gap import Gap
 from mjchair.diagnosis.linear import Reduced, System, Whitener
 from mjchair.diagnosis.sensitivity import Column, Pulse
-from mjchair.diagnosis.shooting import Shooter
+from mjchair.diagnosis.shooting import THREADS, Shooter
 from mjchair.diagnosis.store import Store
 from mjchair.diagnosis.study import Study
 from mjchair.diagnosis.tracking import Track, track
@@ -57,9 +57,11 @@ def silent(_: str) -> None:
     """Say nothing."""
 
 
-def prepare(study: Study, say: Say = silent, store: Store | None = None) -> tuple[Bench, Track]:
+def prepare(
+    study: Study, say: Say = silent, store: Store | None = None, threads: int = THREADS
+) -> tuple[Bench, Track]:
     """Windows, their states, the noise, and what is only roughly known."""
-    shooter = Shooter(study, store=store)
+    shooter = Shooter(study, store=store, threads=threads)
     found = noise.estimate(study)
     say("states along the runs")
     first = track(shooter, shooter.base, found)

@@ -69,9 +69,11 @@ class Shooter:
         study: Study,
         windows: Sequence[Window] | None = None,
         store: Store | None = None,
+        threads: int = THREADS,
     ) -> None:
         """Cut the runs; simulations are kept in the store, where there is one."""
         self.store = store
+        self.threads = threads
         self.study = study
         self.channels = study.channels
         self.spec = without_looks(study.spec)
@@ -201,7 +203,7 @@ class Shooter:
     def _chunk(self, jobs: list[Job], steps: int, trace: bool) -> list[Outcome]:
         models = [_coasting(self.study.runs[j.window.run], j.model) for j in jobs]
         model = models[0]
-        many = batch.Batch(model, len(jobs), THREADS)
+        many = batch.Batch(model, len(jobs), self.threads)
         many.set_models(models)
         self._set_states(many, jobs, model)
         kept: dict[tuple[int, int, float], Array] = {}

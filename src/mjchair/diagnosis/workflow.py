@@ -12,6 +12,7 @@ from mjchair.diagnosis.conclusion import conclude
 from mjchair.diagnosis.fitting import Fitted
 from mjchair.diagnosis.screening import Say, gap_after, prepare, screen_columns, silent
 from mjchair.diagnosis.search import choose
+from mjchair.diagnosis.shooting import THREADS
 from mjchair.diagnosis.store import Store
 from mjchair.diagnosis.study import Study, read_study
 from mjchair.diagnosis.verdict import AMBIGUOUS, NAMED, Diagnosis
@@ -33,6 +34,7 @@ def diagnose(
     effects: Sequence[Effect] = (),
     say: Say = silent,
     store: Store | None = None,
+    threads: int = THREADS,
 ) -> Diagnosis:
     """Find where model and measurement disagree, and name the effect that is missing.
 
@@ -41,6 +43,7 @@ def diagnose(
       effects: of your own, besides the library's.
       say: is called with the name of every stage as it begins.
       store: keeps simulations, so that a second start goes on from an interrupted one.
+      threads: that simulate.
 
     Raises:
       MjchairError: a study that cannot be read or simulated, as one line.
@@ -48,16 +51,12 @@ def diagnose(
     known = study if isinstance(study, Study) else read_study(study)
     # threads cost the linear algebra more than they bring on matrices this small
     with threadpool_limits(1, user_api="blas"):
-        return _diagnose(known, effects, say, store)
-
-
-def _diagnose(known: Study, effects: Sequence[Effect], say: Say, store: Store | None) -> Diagnosis:
-    bench, found = prepare(known, say, store)
-    base = screen_columns(bench, found, study_effects(known, effects), say)
-    say("the gap")
-    gap, _, _ = gap_after(base, base.plain)
-    say("effects, one and two at a time")
-    return conclude(base, gap, choose(base, gap, say) if gap.exists else None)
+        bench, found = prepare(known, say, store, threads)
+        base = screen_columns(bench, found, study_effects(known, effects), say)
+        say("the gap")
+        gap, _, _ = gap_after(base, base.plain)
+        say("effects, one and two at a time")
+        return conclude(base, gap, choose(base, gap, say) if gap.exists else None)
 
 
 def corrected(study: Study, diagnosis: Diagnosis) -> mujoco.MjSpec:
