@@ -28,6 +28,7 @@ from mjchair.diagnosis.verdict import (
 )
 
 Array = NDArray[np.float64]
+TOP = 3  # drivers of a missing force that are worth a word
 
 
 def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
@@ -52,7 +53,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         _summary(base, gap, choice),
         _where(base),
         following,
-        _notes(base, choice, closed, verdict),
+        _notes(base, choice, closed, verdict, left),
         left,
         {
             "base": base,
@@ -194,7 +195,13 @@ def _drivers(gap: Gap) -> list[dict[str, Any]]:
     ][:8]
 
 
-def _notes(base: Base, choice: Choice | None, closed: float, verdict: str) -> list[str]:
+def _notes(
+    base: Base,
+    choice: Choice | None,
+    closed: float,
+    verdict: str,
+    drivers: list[dict[str, Any]],
+) -> list[str]:
     said = list(base.bench.shooter.study.notes)
     for channel, found in base.bench.noise.items():
         if found.source != "study.toml":
@@ -203,5 +210,10 @@ def _notes(base: Base, choice: Choice | None, closed: float, verdict: str) -> li
         names = " and ".join(t.effect.key for t in choice.fitted.fit.terms)
         said.append(
             f"nothing in the library explains the gap; the nearest, {names}, closes {closed:.0%}"
+        )
+    if verdict == UNKNOWN and any(d["goes_with"] == "stroke" for d in drivers[:TOP]):
+        said.append(
+            "the missing force comes back with every stroke: chair and rider are not one rigid "
+            "body, and what of the rider moves, and how heavy it is, these channels do not tell"
         )
     return said
