@@ -88,7 +88,8 @@ TIED = {
     "torque": "Coast through the same speeds without torque: what goes with the drive is gone.",
     "stroke": "Push again with the rider's motion measured (a column rider_motion, m, the forward "
     "displacement of the rider's centre of mass in the chair): a body that moves on the chair "
-    "pushes it to and fro with every stroke. Then let someone else push the chair with the rider still.",
+    "pushes it to and fro with every stroke. Then let someone else push the chair with the rider "
+    "still.",
     "time": "Repeat the run with the largest gap exactly as it was: what happened once does not "
     "come back, what is tied to the place or the wheel's angle does.",
 }

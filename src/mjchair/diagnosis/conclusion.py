@@ -19,7 +19,9 @@ from mjchair.diagnosis.verdict import (
     CLOSES,
     HELD,
     NAMED,
+    NEARLY_ALL,
     NONE,
+    REMAINDER,
     SIGMAS,
     UNKNOWN,
     Diagnosis,
@@ -70,12 +72,19 @@ def _verdict(base: Base, gap: Gap, choice: Choice | None, closed: float) -> str:
         return NONE
     if choice is None or closed < CLOSES or held_out_gain(base, choice.fitted) < HELD:
         return UNKNOWN
+    if closed < NEARLY_ALL and _left(base, choice) > REMAINDER:
+        return UNKNOWN
     sure = (
         all(s > SIGMAS for s in choice.fitted.sigmas.values())
         and not choice.fitted.at_bound
         and held_out_gain(base, choice.fitted, "manoeuvre") > 0.0
     )
     return NAMED if sure and not any(choice.rivals) else AMBIGUOUS
+
+
+def _left(base: Base, choice: Choice) -> float:
+    """Rms of the whitened residual that a fit leaves where it was fitted."""
+    return _rms(*_slow(choice.fitted.system, base.bench.windows))
 
 
 def _alternatives(choice: Choice) -> list[list[str]]:
