@@ -116,3 +116,21 @@ def test_a_delayed_heading_is_in_the_model_itself():
 def test_what_cannot_be_delayed_says_so():
     with pytest.raises(MjchairError, match="MuJoCo delays no sensor of a tire"):
         find("sensor_delay", "left_wheel_tire.Fx")
+
+
+@pytest.mark.parametrize("speed", [2.0, 8.0])
+def test_bearings_brake_a_wheel_in_the_air_as_they_say(speed):
+    spec = mjchair.load_spec()
+    spec.option.gravity = [0.0, 0.0, 0.0]
+    drag = []
+    for viscous in (0.0, 0.05):
+        changed = spec.copy()
+        find("bearing_friction").apply(changed, {"coulomb": 0.0, "viscous": viscous})
+        model = changed.compile()
+        data = mujoco.MjData(model)
+        data.qpos[2] += 1.0
+        dof = model.joint("left_wheel").dofadr[0]
+        data.qvel[dof] = speed
+        mujoco.mj_forward(model, data)
+        drag.append(data.qfrc_passive[dof])
+    assert drag[0] - drag[1] == pytest.approx(0.05 * speed, rel=1e-9)

@@ -1,0 +1,52 @@
+"""Ten cases of the blind benchmark, of another seed than its table: nothing wrong is committed to.
+
+Three of nothing, five of one effect, one of two, one outside the library: the first ten of a seed.
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+BLIND = Path(__file__).parents[1] / "benchmarks" / "blind"
+SLICE = ("--seed", "60", "--count", "10", "--trials", "3", "--seconds", "4")
+sys.path.insert(0, str(BLIND))
+
+
+@pytest.fixture(scope="module")
+def lines(tmp_path_factory):
+    """Results of the slice, as the benchmark's own command writes them."""
+    work = tmp_path_factory.mktemp("blind")
+    command = [sys.executable, str(BLIND / "run.py"), *SLICE, "--work", str(work)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    path = work / "results_60.jsonl"
+    assert "| figure | aim | result |" in done.stdout
+    again = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert again.stdout.startswith("| figure"), "a second start has nothing left to run"
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+def test_the_slice_is_whole(lines):
+    assert sorted(line["number"] for line in lines) == list(range(10))
+    assert not any(line["verdict"] == "error" for line in lines)
+
+
+def test_nothing_is_named_where_nothing_is_hidden_or_known(lines):
+    from table import named
+
+    for line in lines:
+        if line["answer"]["kind"] in ("none", "outside"):
+            assert not named(line), line["answer"]
+
+
+def test_what_is_named_is_what_was_hidden(lines):
+    from table import clear, kept, returned, wrong
+
+    ones = [line for line in lines if line["answer"]["kind"] == "one"]
+    assert not any(wrong(line) for line in ones)
+    seen = [line for line in ones if clear(line) and returned(line)]
+    assert len(seen) >= 3
+    assert all(kept(line) for line in seen)
