@@ -119,6 +119,29 @@ def test_the_ground_is_where_mujoco_has_it():
         assert 3.0 - ray == pytest.approx(height + data.geom_xpos[floor, 2], abs=1e-5)
 
 
+def test_a_contact_is_whole_in_any_pose():
+    """Upside down, on its side, across the rim, deep in the ground; on 50 mm steps."""
+    random = np.random.default_rng(3)
+    model = build("hfield", heights=random.uniform(0.0, 0.05, (101, 201)))
+    data, seen = mujoco.MjData(model), 0
+    tires = [model.geom(name).id for name in TIRE_GEOMS]
+    for _ in range(500):
+        data.qpos[:3] = random.uniform([-5.6, -3.0, -0.6], [5.6, 3.0, 0.8])
+        turned = random.normal(size=4)
+        data.qpos[3:7] = turned / np.linalg.norm(turned)
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_collision(model, data)
+        for at in np.flatnonzero(np.isin(data.contact.geom[:, 1], tires)):
+            seen += 1
+            tire = data.contact.geom[at, 1]
+            away = np.linalg.norm(data.contact.pos[at] - data.geom_xpos[tire])
+            assert data.contact.dist[at] <= 0.0
+            assert np.linalg.norm(data.contact.frame[at, :3]) == pytest.approx(1.0)
+            assert away <= model.geom_size[tire, 0] - data.contact.dist[at]
+    assert seen > 500
+
+
 def test_an_ellipsoid_that_is_no_tire_keeps_mujocos_contacts():
     xml = """<mujoco><asset><hfield name="f" nrow="9" ncol="9" size="1 1 0.1 0.1"/></asset>
     <worldbody><geom type="hfield" hfield="f"/><body pos="0.03 0.02 0.09"><freejoint/>
