@@ -18,6 +18,10 @@ from mjchair.tire.compiled import fingerprint
 
 STAGE_ACC = int(mjtStage.mjSTAGE_ACC)
 NATIVE = "mjchair_native_field_contact"  # MuJoCo's own function, under this name for the linker
+COLLISION = types.int32(
+    types.int64, types.int64, types.int64, types.int32, types.int32, types.float64
+)  # model, data, contacts found, two geoms, margin -> how many
+native_contact = types.ExternalFunction(NATIVE, COLLISION)
 MANY = 1 << 40  # bounds are not checked: only the trailing sizes matter
 
 
@@ -188,17 +192,13 @@ def field_contact() -> Any:
         *(layout.offset("mjData", name) for name in names[-2:]),
     )
     binding.add_symbol(NATIVE, collision.original())
-    kind = types.int32(
-        types.int64, types.int64, types.int64, types.int32, types.int32, types.float64
-    )
-    native = types.ExternalFunction(NATIVE, kind)
 
-    @cfunc(kind, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+    @cfunc(COLLISION, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
     def contact(m, d, found, ground, tire, margin):  # type: ignore[no-untyped-def]
         _ = sources
         width = _load(m + at.nuser_geom, types.int64)
         if width < block.HEADER or _rows(m + at.geom_user, width)[tire, block.TAG_AT] != block.TAG:
-            return native(m, d, found, ground, tire, margin)
+            return native_contact(m, d, found, ground, tire, margin)
         which = _ints(m + at.geom_dataid)[ground]
         out = carray(_pointer(found, types.float64), (10,))  # the last three: a tangent, any
         out[7] = out[8] = out[9] = 0.0
