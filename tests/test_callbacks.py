@@ -98,7 +98,10 @@ def test_contact_offsets_are_checked(monkeypatch):
 
 def test_compiled_code_is_found_again_by_another_process():
     mjchair.install()
-    code = "from mjchair.engine import native; print([f.cache_hits for f in native.callbacks()])"
+    code = (
+        "from mjchair.engine import native; "
+        "print([f.cache_hits for f in (*native.callbacks(), native.field_contact())])"
+    )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert set(eval(found.stdout)) == {1}
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
-from mujoco import batch
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
@@ -21,14 +20,12 @@ from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
 from mjchair.model.looks import without_looks
 from mjchair.model.wheels import COMFORTABLE, base_name, check_timestep, cut_damping
-from mjchair.simulation import names
+from mjchair.simulation import batch, names
 from mjchair.simulation.channels import channels
 
 Array = NDArray[np.float64]
 ANGLES = ("heading",)  # channels that wrap
-BYTES = 120_000_000  # of recorded sensor data at once
-CONTROL = mujoco.mjtState.mjSTATE_CTRL
-FORCE = mujoco.mjtState.mjSTATE_QFRC_APPLIED
+FORCE = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
 SMOOTHING = 0.12  # s, half width of the parabola through a measured motion
 THREADS = 2
 
@@ -182,30 +179,22 @@ class Shooter:
     def _simulate(self, jobs: Sequence[Job], trace: bool) -> list[Outcome]:
         """Equal model sizes go together."""
         outcomes: list[Outcome | None] = [None] * len(jobs)
-        groups: dict[tuple[object, ...], list[int]] = {}
-        for i, job in enumerate(jobs):
-            m = job.model
-            key = (m.nq, m.nv, m.na, m.nu, m.nsensordata, m.neq, m.nsite, m.opt.timestep)
-            groups.setdefault((*key, job.force is None), []).append(i)
-        for members in groups.values():
-            model = jobs[members[0]].model
-            steps = int(np.ceil(self.steps * self.step / model.opt.timestep)) + 1
-            width = model.nsensordata + (model.nq + model.nv + model.na if trace else 0)
-            size = max(2, int(BYTES / (8 * steps * width)))
-            for at in range(0, len(members), size):
-                chunk = members[at : at + size]
-                with installed():
-                    done = self._chunk([jobs[i] for i in chunk], steps, trace)
-                for i, outcome in zip(chunk, done, strict=True):
-                    outcomes[i] = outcome
+        models, driven = [job.model for job in jobs], [job.force is None for job in jobs]
+        record = ("sensordata", *(("qpos", "qvel", "act") if trace else ()))
+        for chunk in batch.groups(models, self._steps, record, driven):
+            with installed():
+                done = self._chunk([jobs[i] for i in chunk], record)
+            for i, outcome in zip(chunk, done, strict=True):
+                outcomes[i] = outcome
         return [o for o in outcomes if o is not None]
 
-    def _chunk(self, jobs: list[Job], steps: int, trace: bool) -> list[Outcome]:
+    def _steps(self, model: mujoco.MjModel) -> int:
+        return int(np.ceil(self.steps * self.step / model.opt.timestep)) + 1
+
+    def _chunk(self, jobs: list[Job], record: Sequence[str]) -> list[Outcome]:
         models = [_coasting(self.study.runs[j.window.run], j.model) for j in jobs]
         model = models[0]
-        many = batch.Batch(model, len(jobs), self.threads)
-        many.set_models(models)
-        self._set_states(many, jobs, model)
+        steps = self._steps(model)
         kept: dict[tuple[int, int, float], Array] = {}
         rows = []
         for job, m in zip(jobs, models, strict=True):
@@ -213,12 +202,12 @@ class Shooter:
             if key not in kept:
                 kept[key] = self.controls(m, job.window, steps, job.late)
             rows.append(kept[key])
-        control, what = np.stack(rows), int(CONTROL)
+        control, what = np.stack(rows), batch.CONTROL
         if jobs[0].force is not None:
             forces = np.stack([_resized(j.force, steps) for j in jobs])
-            control, what = np.concatenate([control, forces], axis=2), what | int(FORCE)
-        record = ["sensordata", *(("qpos", "qvel", "act") if trace else ())]
-        out = many.rollout(steps, control, what, record=record)
+            control, what = np.concatenate([control, forces], axis=2), what | FORCE
+        states = self._states(jobs, model)
+        out, _ = batch.roll(models, states, control, what=what, record=record, threads=self.threads)
         return [
             Outcome(
                 self._sampled(model, job.window, out["sensordata"][i]),
@@ -227,15 +216,19 @@ class Shooter:
             for i, job in enumerate(jobs)
         ]
 
-    def _set_states(self, many: batch.Batch, jobs: list[Job], model: mujoco.MjModel) -> None:
-        qpos, qvel, act = many.bind("qpos"), many.bind("qvel"), many.bind("act")
-        qpos[:] = model.qpos0
-        time = many.bind("time")
+    def _states(self, jobs: list[Job], model: mujoco.MjModel) -> dict[str, Array]:
+        """Of the jobs' starts: time (jobs,), qpos, qvel and act (jobs, ...)."""
         same = (model.nq, model.nv, model.na) == (self.base.nq, self.base.nv, self.base.na)
-        for i, job in enumerate(jobs):
-            time[i] = job.window.start
-            state = self.resting(job.state, job.model) if same else self._fitted_to(model, job)
-            qpos[i], qvel[i], act[i] = state.qpos, state.qvel, state.act
+        states = [
+            self.resting(job.state, job.model) if same else self._fitted_to(model, job)
+            for job in jobs
+        ]
+        return {
+            "time": np.array([job.window.start for job in jobs]),
+            "qpos": np.stack([state.qpos for state in states]),
+            "qvel": np.stack([state.qvel for state in states]),
+            "act": np.stack([state.act for state in states]),
+        }
 
     def resting(self, state: State, model: mujoco.MjModel, back: bool = False) -> State:
         """A state of the base model as this model rests on its tires; or `back` again.

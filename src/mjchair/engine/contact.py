@@ -1,19 +1,20 @@
 """The contacts of one wheel as one: what they push with together, where, and along what.
 
-MuJoCo makes one contact with a plane, a box or a mesh, but on a height field one with every prism
-that the tire reaches into. Each contact is a spring, and springs side by side are as many times
-stiffer; and the contacts with the prisms round about are pushed out over an edge, slantwise. So
-each contact gets a share of its stiffness, way_i / depth_i, where the ways are the solution of
+MuJoCo makes one contact with a plane, a box or a mesh, and engine/field.py one with a height
+field; but a floor may be of several, as tiles, or a kerb on a plane. Each contact is a spring, and
+springs side by side are as many times stiffer; and a contact with a neighbour's edge is pushed out
+slantwise. So each contact gets a share of its stiffness, way_i / depth_i, where the ways are the
+solution of
 
     way_i >= 0,   sum over j of overlap_ij way_j >= depth_i,   one of the two with equality.
 
 overlap_ij is how much of contact i's dent the dent of contact j brings along: 1 at the same place,
-falling with the square of the distance as the ellipsoid rises, to 0 where their dents end. On a
-flat height field this leaves the deepest contact, which is the plane's; tiles in one plane count
-once; floor and kerb, a dent's length apart, are two springs. In between the shares go over into
-one another without a jump: a contact that begins or ends has none. For a given overlap the force
-has the potential  stiffness * (way . depth - way . overlap way / 2),  so that rolling over an edge
-neither makes nor takes energy.
+falling with the square of the distance as the ellipsoid rises, to 0 where their dents end. Tiles
+in one plane count once, as the deepest contact alone; floor and kerb, a dent's length apart, are
+two springs. In between the shares go over into one another without a jump: a contact that begins
+or ends has none. For a given overlap the force has the potential
+stiffness * (way . depth - way . overlap way / 2),  so that rolling over an edge neither makes nor
+takes energy.
 
 The shares are given as factors of `efc_D`, the constraint's mass; `efc_R` stays MuJoCo's, so that
 doing it again changes nothing. Solvers of the primal problem (Newton, CG) read `efc_D`; PGS does

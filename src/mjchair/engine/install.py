@@ -1,8 +1,9 @@
 """Put the tire callbacks in place, and take them out again.
 
 MuJoCo's callbacks are global to the process. `mjcb_act_dyn`, `mjcb_sensor` and `mjcb_act_bias`
-are used; `mjcb_control` and the others stay the user's. Models without tires are untouched: their
-user actuators and user sensors find nothing of ours to do.
+are used, and in `mjCOLLISIONFUNC` the entry of height field and ellipsoid; `mjcb_control` and the
+others stay the user's. Models without tires are untouched: their user actuators, user sensors and
+ellipsoids find nothing of ours to do.
 """
 
 from __future__ import annotations
@@ -13,17 +14,23 @@ from typing import Any
 
 import mujoco
 
-from mjchair.engine import plain
+from mjchair.engine import collision, plain
 
 
-def _current() -> tuple[Any, Any, Any]:
-    return mujoco.get_mjcb_act_dyn(), mujoco.get_mjcb_sensor(), mujoco.get_mjcb_act_bias()
+def _current() -> tuple[Any, Any, Any, int]:
+    return (
+        mujoco.get_mjcb_act_dyn(),
+        mujoco.get_mjcb_sensor(),
+        mujoco.get_mjcb_act_bias(),
+        collision.current(),
+    )
 
 
-def _put(callbacks: tuple[Any, Any, Any]) -> None:
-    mujoco.set_mjcb_act_dyn(callbacks[0])
-    mujoco.set_mjcb_sensor(callbacks[1])
-    mujoco.set_mjcb_act_bias(callbacks[2])
+def _put(act_dyn: Any, sensor: Any, act_bias: Any, contact: int) -> None:
+    mujoco.set_mjcb_act_dyn(act_dyn)
+    mujoco.set_mjcb_sensor(sensor)
+    mujoco.set_mjcb_act_bias(act_bias)
+    collision.put(contact)
 
 
 def install(compiled: bool = True) -> None:
@@ -31,23 +38,25 @@ def install(compiled: bool = True) -> None:
 
     Args:
       compiled: the native callbacks, which every MuJoCo tool runs, on any number of threads.
-        False: the same law as ordinary Python, about a hundred times slower, for one thread.
+        False: the same law as ordinary Python, about a hundred times slower, for one thread;
+        the contact with a height field is the compiled one all the same.
 
     Raises:
       LayoutError: the installed MuJoCo's memory is not as it describes it.
     """
-    if compiled:
-        from mjchair.engine import native
+    from mjchair.engine import native
 
+    contact = native.field_contact().address
+    if compiled:
         act_dyn, sensor, act_bias = native.callbacks()
-        _put((act_dyn.ctypes, sensor.ctypes, act_bias.ctypes))
+        _put(act_dyn.ctypes, sensor.ctypes, act_bias.ctypes, contact)
     else:
-        _put((plain.act_dyn, plain.sensor, plain.act_bias))
+        _put(plain.act_dyn, plain.sensor, plain.act_bias, contact)
 
 
 def uninstall() -> None:
     """Take the callbacks out: wheels roll without friction then."""
-    _put((None, None, None))
+    _put(None, None, None, collision.original())
 
 
 @contextmanager
@@ -58,4 +67,4 @@ def installed(compiled: bool = True) -> Iterator[None]:
     try:
         yield
     finally:
-        _put(before)
+        _put(*before)

@@ -46,6 +46,12 @@ MODEL_ARRAYS = (
     "geom_size",
     "geom_user",
     "geom_surfacevel",
+    "geom_dataid",
+    "hfield_adr",
+    "hfield_nrow",
+    "hfield_ncol",
+    "hfield_size",
+    "hfield_data",
     "sensor_type",
     "sensor_objtype",
     "sensor_objid",
@@ -72,6 +78,7 @@ DATA_ARRAYS = (
     "iefc_D",
     "map_efc2iefc",
 )
+FOUND = {"dist": 0, "pos": 8, "normal": 32, "tangent": 56}  # bytes; a contact as it is found
 CONTACT_FIELDS = ("dist", "pos", "frame", "includemargin", "geom", "efc_address")
 
 
@@ -116,8 +123,10 @@ def offset(name: str, member: str) -> int:
 
 _PROBE = """
 <mujoco>
+  <asset><hfield name="field" nrow="2" ncol="3" size="1 1 1 1"/></asset>
   <worldbody>
     <geom name="floor" type="plane" size="1 1 1"/>
+    <geom name="field" type="hfield" hfield="field" pos="0 0 -9"/>
     <body name="wheel" pos="0 0 0.099">
       <freejoint name="free"/>
       <site name="site"/>
@@ -165,10 +174,11 @@ def check() -> None:
     if step != model.opt.timestep:
         wrong.append("mjModel.opt.timestep")
     wrong += _wrong_in_contact(data)
+    wrong += [f"mjPreContact.{m}" for m, at in FOUND.items() if offset("mjPreContact", m) != at]
     if wrong:
         raise LayoutError(
             f"mujoco {mujoco.__version__} has {', '.join(wrong)} elsewhere than it describes; "
-            "use mujoco 3.17, or install(compiled=False)"
+            "use mujoco 3.17"
         )
 
 

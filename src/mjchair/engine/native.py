@@ -6,16 +6,22 @@ import functools
 from typing import Any, NamedTuple
 
 import mujoco
-from llvmlite import ir
+from llvmlite import binding, ir
 from mujoco import mjtStage
 from numba import carray, cfunc, njit, types
 from numba.extending import intrinsic, register_jitable
 
-from mjchair.engine import element, layout, wheel
+from mjchair.engine import collision, element, field, layout, wheel
 from mjchair.engine.views import DataView, ModelView
+from mjchair.tire import block
 from mjchair.tire.compiled import fingerprint
 
 STAGE_ACC = int(mjtStage.mjSTAGE_ACC)
+NATIVE = "mjchair_native_field_contact"  # MuJoCo's own function, under this name for the linker
+COLLISION = types.int32(
+    types.int64, types.int64, types.int64, types.int32, types.int32, types.float64
+)  # model, data, contacts found, two geoms, margin -> how many
+native_contact = types.ExternalFunction(NATIVE, COLLISION)
 MANY = 1 << 40  # bounds are not checked: only the trailing sizes matter
 
 
@@ -153,6 +159,67 @@ def _offsets() -> tuple[ModelView, DataView, Sizes]:
         layout.contact_size(),
     )
     return ModelView(*model), DataView(*data), sizes
+
+
+class FieldOffsets(NamedTuple):
+    """Offsets in bytes of what a height field's contact needs, of the model and the data."""
+
+    nuser_geom: int
+    geom_user: int
+    geom_dataid: int
+    geom_size: int
+    hfield_adr: int
+    hfield_nrow: int
+    hfield_ncol: int
+    hfield_size: int
+    hfield_data: int
+    geom_xpos: int
+    geom_xmat: int
+
+
+@functools.cache
+def field_contact() -> Any:
+    """The compiled collision function of a height field and an ellipsoid, as a Numba cfunc.
+
+    Raises:
+      LayoutError: MuJoCo's memory is not as described.
+    """
+    layout.check()
+    sources = fingerprint() + mujoco.__version__
+    names = FieldOffsets._fields
+    at = FieldOffsets(
+        *(layout.offset("mjModel", name) for name in names[:-2]),
+        *(layout.offset("mjData", name) for name in names[-2:]),
+    )
+    binding.add_symbol(NATIVE, collision.original())
+
+    @cfunc(COLLISION, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+    def contact(m, d, found, ground, tire, margin):  # type: ignore[no-untyped-def]
+        _ = sources
+        width = _load(m + at.nuser_geom, types.int64)
+        if width < block.HEADER or _rows(m + at.geom_user, width)[tire, block.TAG_AT] != block.TAG:
+            return native_contact(m, d, found, ground, tire, margin)
+        which = _ints(m + at.geom_dataid)[ground]
+        out = carray(_pointer(found, types.float64), (10,))  # the last three: a tangent, any
+        out[7] = out[8] = out[9] = 0.0
+        touches = field.touch(
+            _rows(d + at.geom_xpos, 3),
+            _rows(d + at.geom_xmat, 9),
+            _rows(m + at.geom_size, 3),
+            ground,
+            tire,
+            carray(_pointer(_load(m + at.hfield_data, types.int64), types.float32), (MANY,)),
+            _ints(m + at.hfield_adr)[which],
+            _ints(m + at.hfield_nrow)[which],
+            _ints(m + at.hfield_ncol)[which],
+            _rows(m + at.hfield_size, 4),
+            which,
+            margin,
+            out,
+        )
+        return 1 if touches else 0
+
+    return contact
 
 
 @functools.cache

@@ -1,4 +1,4 @@
-"""Some cases of a study, simulated together through `mujoco.batch`.
+"""Some cases of a study, simulated together.
 
 The same function runs here and on a Dask worker. Each simulation of a batch is what it would be
 alone, to the bit, so it does not matter which cases share a chunk, nor on how many threads.
@@ -13,7 +13,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from mujoco import batch
 from numpy.typing import NDArray
 
 from mjchair.effects import library
@@ -22,7 +21,7 @@ from mjchair.errors import MjchairError
 from mjchair.model.looks import without_looks
 from mjchair.model.spec import compile_spec, load_spec
 from mjchair.model.wheels import check, cut_damping
-from mjchair.simulation import names
+from mjchair.simulation import batch, names
 from mjchair.simulation.channels import channels
 from mjchair.simulation.initial import start
 from mjchair.simulation.inputs import drivable
@@ -34,9 +33,6 @@ Array = NDArray[np.float64]
 Measure = Callable[[Sensed], Mapping[str, float]]
 
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-BYTES = 150_000_000  # of sensor data recorded at once
-# models of one batch must agree in these
-SIZES = ("nq", "nv", "na", "nu", "nbody", "njnt", "ngeom", "nsite", "neq", "ntendon", "nsensordata")
 COMPLETED, UNSTABLE = "completed", "unstable"
 
 
@@ -102,55 +98,33 @@ def run_chunk(
     rows: list[dict[str, Any]] = []
     install()
     models = [_chair(key(case)) for case in cases]
-    for group in _groups(models):
+    for group in batch.groups(models, lambda model: _steps(study, model)):
         chosen = [cases[i] for i in group]
-        outcome = _simulate(study, chosen, [models[i] for i in group], threads)
+        outcome = _batch(study, chosen, [models[i] for i in group], threads)
         for i, case, found in zip(group, chosen, outcome, strict=True):
             rows.append({"case": first + i, **case, **found})
     return sorted(rows, key=lambda row: int(row["case"]))
 
 
-def _groups(models: Sequence[mujoco.MjModel]) -> list[list[int]]:
-    """Indices of models that can share a batch, bounded by the memory of what is recorded."""
-    groups: dict[tuple[Any, ...], list[int]] = {}
-    for i, model in enumerate(models):
-        sizes = (*(getattr(model, name) for name in SIZES), model.opt.timestep)
-        groups.setdefault(sizes, []).append(i)
-    return list(groups.values())
-
-
-def _simulate(
-    study: Study, cases: Sequence[Case], models: Sequence[mujoco.MjModel], threads: int
-) -> list[dict[str, Any]]:
-    model = models[0]
-    steps = max(2, round(study.duration / model.opt.timestep))
-    most = max(1, BYTES // (8 * steps * max(model.nsensordata, 1)))
-    found: list[dict[str, Any]] = []
-    for at in range(0, len(cases), most):
-        found += _batch(study, cases[at : at + most], models[at : at + most], steps, threads)
-    return found
+def _steps(study: Study, model: mujoco.MjModel) -> int:
+    return max(2, round(study.duration / model.opt.timestep))
 
 
 def _batch(
-    study: Study,
-    cases: Sequence[Case],
-    models: Sequence[mujoco.MjModel],
-    steps: int,
-    threads: int,
+    study: Study, cases: Sequence[Case], models: Sequence[mujoco.MjModel], threads: int
 ) -> list[dict[str, Any]]:
+    """Status and measures of cases that can share a batch."""
     model = models[0]
-    time = model.opt.timestep * np.arange(steps)
-    many = batch.Batch(model, len(cases), threads)
-    many.set_models(list(models))
-    many.state[:] = [
+    time = model.opt.timestep * np.arange(_steps(study, model))
+    states = [
         _start(key(case), json.dumps({k: case[k] for k in study_module.STARTED if k in case}))
         for case in cases
     ]
     control = np.stack(
         [study.drive(case).control_array(m, time) for case, m in zip(cases, models, strict=True)]
     )
-    sensed = many.rollout(steps, control, record=("sensordata",))["sensordata"]
-    broken = many.warning.reshape(len(cases), -1).any(axis=1)
+    records, broken = batch.roll(models, {"state": np.stack(states)}, control, threads=threads)
+    sensed = records["sensordata"]
     places = {c.name: c.index for c in channels(model)}
     driven = {name: names.actuators(model).index(name) for name in drivable(model)}
     measure = study.measures or standard
