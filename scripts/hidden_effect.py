@@ -2,8 +2,8 @@
 
     python scripts/hidden_effect.py --out out/hidden_effect
 
-`hide` holds the slalom out: no fit sees it, so it shows whether the corrected chair is right where
-it was not made to be. Each step is what the command line does; see docs/diagnosis.md.
+`hide` holds the pushed run out: no fit sees it, so it shows whether the corrected chair is right
+where it was not made to be. Each step is what the command line does; see docs/diagnosis.md.
 """
 
 from __future__ import annotations
