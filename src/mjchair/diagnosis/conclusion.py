@@ -13,9 +13,10 @@ from mjchair.diagnosis.fitting import Fitted
 from mjchair.diagnosis.gap import Gap
 from mjchair.diagnosis.linear import System
 from mjchair.diagnosis.screening import Base
-from mjchair.diagnosis.search import Choice, closure, gain, held_out, held_out_gain
+from mjchair.diagnosis.search import MOST, Choice, closure, gain, held_out, held_out_gain
 from mjchair.diagnosis.verdict import (
     AMBIGUOUS,
+    CARRIED,
     CLOSES,
     HELD,
     NAMED,
@@ -74,12 +75,31 @@ def _verdict(base: Base, gap: Gap, choice: Choice | None, closed: float) -> str:
         return UNKNOWN
     if closed < NEARLY_ALL and _left(base, choice) > REMAINDER:
         return UNKNOWN
+    if choice.after[-1].exists and len(choice.hypothesis.starts) == MOST:
+        return UNKNOWN
+    if not _carries_over(base, choice):
+        return UNKNOWN
     sure = (
         all(s > SIGMAS for s in choice.fitted.sigmas.values())
         and not choice.fitted.at_bound
         and held_out_gain(base, choice.fitted, "manoeuvre") > 0.0
     )
     return NAMED if sure and not any(choice.rivals) else AMBIGUOUS
+
+
+def _carries_over(base: Base, choice: Choice) -> bool:
+    """Whether the held-out trials, which no fit has seen, do not speak against the choice.
+
+    A gap that shows in them must close by CARRIED; none must open.
+    """
+    held = _held_windows(base)
+    if not held.size:
+        return True
+    before, dof = _slow(base.plain.system, held)
+    after, _ = _slow(choice.fitted.system, held)
+    scatter = 3.0 * float(np.sqrt(2.0 * dof))
+    gap, left = before - dof, after - dof
+    return left < max((1.0 - CARRIED) * gap, scatter) if gap > scatter else left < gap + scatter
 
 
 def _left(base: Base, choice: Choice) -> float:

@@ -15,6 +15,8 @@ from mjchair.diagnosis.linear import Reduced
 Array = NDArray[np.float64]
 PENALTY = 10.0  # chi2 that a parameter must bring: log of the number of samples
 SHORTLIST = 60
+# a wind along an axis has nothing across it, give or take: the sign of that is no matter
+AGAINST = -0.2
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ def physical(reduced: Reduced, hypothesis: Hypothesis) -> bool:
     for start, mine in _split(hypothesis, coefficients):
         if start.effect.tags.get("place") and mine[0] < 0.0:
             return False
-        if start.effect.seeds is not None and start.effect.name == "wind" and (mine < 0.0).any():
+        if start.effect.name == "wind" and (mine < AGAINST).any():
             return False
     return True
 
