@@ -14,6 +14,7 @@ from mjchair.simulation.channels import channels
 ENOUGH = 3.0  # sigmas that decide
 CLOSE = 0.7  # of the best T, that is worth a word
 OFTEN = 20  # repetitions beyond which nobody would
+NEARLY = 0.8  # of the strongest driver's sigmas
 MOST = 30.0  # sigmas, beyond which the number says nothing more
 
 
@@ -108,7 +109,14 @@ def searching(drivers: Sequence[Mapping[str, Any]]) -> str:
     """What to do about a force that no effect explains, from what it goes with, strongest first."""
     if not drivers:
         return OTHERWISE
-    tied = str(drivers[0]["goes_with"])
+    # a force at a moment fits anything: what else goes with it nearly as well says more
+    telling = [
+        d
+        for d in drivers
+        if not str(d["goes_with"]).startswith("time")
+        and d["sigmas"] > NEARLY * drivers[0]["sigmas"]
+    ]
+    tied = str((telling or drivers)[0]["goes_with"])
     if tied.endswith("wheel's turn"):
         return WHEEL.format(wheel=tied.removesuffix("'s turn"))
     return TIED.get(tied.split(" in ")[0], OTHERWISE)

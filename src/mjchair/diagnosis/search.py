@@ -190,6 +190,8 @@ def _rivals(base: Base, chosen: Hypothesis, fitted: Fitted, say: Say) -> list[li
         kept = []
         for h in near[:REFITTED]:
             other = _refit(base, h, say)
+            if other.at_bound and not fitted.at_bound:
+                continue  # it would have to be larger than it can be
             behind = other.total - fitted.total + PENALTY * (h.free - chosen.free)
             if behind < RIVAL_CHI2 or _paired(other.chi2, fitted.chi2) < RIVAL_ERRORS:
                 kept.append(Rival(h, other))
