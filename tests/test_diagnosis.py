@@ -3,16 +3,22 @@
 import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+import mjchair
 from mjchair.cli import main
 from mjchair.diagnosis import linear
+from mjchair.diagnosis.chair import Chair, State
 from mjchair.diagnosis.linear import System
 from mjchair.diagnosis.noise import Noise
+from mjchair.effects.library import find
+from mjchair.simulation.initial import Initial, start
+from mjchair.simulation.inputs import Inputs
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks" / "blind"))
 
@@ -50,8 +56,6 @@ def test_the_corrected_chair_rolls_and_the_report_opens_offline(slope):
 
 def test_no_effect_is_not_named(tmp_path):
     from generator import Case, make
-
-    import mjchair
 
     make(tmp_path, Case("none"), 6, 3, 4.0)
     assert mjchair.diagnose(tmp_path).verdict == "none"
@@ -93,3 +97,43 @@ def test_noise_covariance_is_that_of_white_and_correlated_noise():
     covariance = noise.covariance(np.array([0.0, 0.1]))
     assert covariance[0, 0] == pytest.approx(0.25)
     assert covariance[0, 1] == pytest.approx(0.16 * np.exp(-1.0))
+
+
+def test_the_phase_of_a_stroke_grows_by_a_turn_a_stroke():
+    from mjchair.diagnosis.force import stroke_phase
+
+    time = np.arange(0.0, 6.0, 0.01)
+    torque = np.maximum(0.0, np.sin(2.0 * np.pi * time / 1.2)) ** 2
+    inputs = Inputs(time, {"left_wheel": 9.0 * torque, "right_wheel": 8.0 * torque})
+    at, phase = stroke_phase(SimpleNamespace(trial=SimpleNamespace(inputs=inputs)))
+    turns = np.diff(phase[1:-1]) / (2.0 * np.pi)
+    np.testing.assert_allclose(turns, 1.0)
+    np.testing.assert_allclose(np.diff(at[1:-1]), 1.2, atol=0.011)
+    assert np.isnan(phase[[0, -1]]).all()
+    nothing = SimpleNamespace(trial=SimpleNamespace(inputs=None))
+    assert np.isnan(stroke_phase(nothing)[1]).all()
+
+
+def test_a_chair_with_a_smaller_wheel_begins_at_rest_on_it():
+    spec = mjchair.load_spec()
+    base = spec.copy().compile()
+    find("wheel_radius").apply(spec, {"left": -0.004, "right": 0.0})
+    model = spec.compile()
+    chair = Chair(base)
+    with mjchair.installed():
+        rests = [chair.rest(m) for m in (base, model)]
+        data = start(base, Initial())
+        state = State(data.qpos.copy(), data.qvel.copy(), data.act.copy())
+        lowered = chair.lowered(state, *rests)
+        falls = [_falls(model, s) for s in (state, lowered)]
+    assert falls[0] > 1.0 > 10.0 * falls[1]  # m/s^2
+    back = chair.lowered(lowered, *rests[::-1])
+    np.testing.assert_allclose(back.qpos, state.qpos, atol=1e-12)
+
+
+def _falls(model, state):
+    """The largest acceleration (m/s^2) of a chair that is let go in a state."""
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:], data.act[:] = state.qpos, state.qvel, state.act
+    mujoco.mj_forward(model, data)
+    return np.abs(data.qacc[2])

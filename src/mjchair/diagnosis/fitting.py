@@ -18,6 +18,7 @@ from mjchair.diagnosis.sensitivity import Column, Point
 from mjchair.diagnosis.shooting import Shooter
 from mjchair.diagnosis.tracking import Track, track
 from mjchair.effects.effect import Effect, Values, clip
+from mjchair.errors import MjchairError
 
 Array = NDArray[np.float64]
 ROUNDS = 6  # at most, of Gauss-Newton
@@ -229,7 +230,11 @@ def refit(
     for _ in range(rounds):
         if best.total - best.promised < DONE:
             break
-        here = _around(bench, fit, best.track, nuisances)
+        try:
+            here = _around(bench, fit, best.track, nuisances)
+        except MjchairError:  # of a step to what no chair can be
+            fit = _between(best.fit, fit)
+            continue
         if here.total < best.total:
             best, fit = here, _moved(bench, here)
         else:  # a step too far

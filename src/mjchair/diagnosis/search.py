@@ -23,6 +23,8 @@ WORTH = 15.0  # chi2 that a further effect must bring besides the penalty of its
 ENOUGH = 0.93  # closure beyond which a further effect must bring more than
 SHARE = 0.02  # of what is already gained: an effect's own form is no better known
 TIE = 6.0  # chi2 within which hypotheses fit alike
+SURE = 6.0  # standard errors beyond which an effect is not tried without
+TRIED = 3  # hypotheses of one size, where the first leaves a gap
 REFITTED = 5  # rivals of one effect
 SHORT = 0.1  # of what the linear fit promised: a fit that misses more starts again elsewhere
 ALONE = 0.05  # share of a column that the other parts must show, for a part to be held out
@@ -66,12 +68,11 @@ def choose(base: Base, gap: Gap, say: Say) -> Choice | None:
             options.append(selection.grown(base.reduced, base.starts, bases))
         if not options[size - 1] or options[size - 1][0].score <= 0.0:
             break
-        top = _commonest(base, options[size - 1])
-        fitted = _refit(base, top, say)
+        top, fitted, left = _best_of(base, options[size - 1], say)
         if best is not None and not _worth(gap, base, best, after[-1], (top, fitted)):
             break
         best = (top, fitted)
-        after.append(gap_after(base, fitted)[0])
+        after.append(left)
         if not after[-1].exists:
             break
     assert best is not None
@@ -81,6 +82,24 @@ def choose(base: Base, gap: Gap, say: Say) -> Choice | None:
     fitted = refit(base.bench, fitted.fit, fitted.track)
     after[-1] = gap_after(base, fitted)[0]
     return Choice(hypothesis, fitted, after, rivals)
+
+
+def _best_of(base: Base, options: Sequence[Hypothesis], say: Say) -> tuple[Hypothesis, Fitted, Gap]:
+    """The best hypothesis, its fit, and the gap that it leaves.
+
+    Where the first leaves a gap, the linear order may be wrong, and the next are fitted as well.
+    """
+    top = _commonest(base, options)
+    fitted = _refit(base, top, say)
+    left = gap_after(base, fitted)[0]
+    if not left.exists:
+        return top, fitted, left
+    first = top
+    for other in [h for h in options if h.keys != first.keys][: TRIED - 1]:
+        found = _refit(base, other, say)
+        if found.total + PENALTY * other.free < fitted.total + PENALTY * top.free:
+            top, fitted = other, found
+    return top, fitted, left if top is first else gap_after(base, fitted)[0]
 
 
 def _worth(
@@ -105,7 +124,8 @@ def _dropped(
     for start in hypothesis.starts if len(hypothesis.starts) > 1 else ():
         fewer = selection.weigh(base.reduced, [s for s in hypothesis.starts if s is not start])
         needed = PENALTY * (hypothesis.free - fewer.free) + WORTH
-        if hypothesis.gain - fewer.gain > 3.0 * needed:
+        sure = fitted.sigmas[start.effect.key] > SURE
+        if sure and hypothesis.gain - fewer.gain > 3.0 * needed:
             continue  # far from it already by linear algebra
         other = _refit(base, fewer, say)
         if other.total - fitted.total < needed:

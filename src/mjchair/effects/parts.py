@@ -85,13 +85,18 @@ def inertia_tensor(body: Any) -> NDArray[np.float64]:
 
 
 def set_inertia(body: Any, tensor: NDArray[np.float64]) -> None:
-    """Write an inertia (3, 3) kg m^2 about the centre of mass, in the body's axes."""
+    """Write an inertia (3, 3) kg m^2 about the centre of mass, in the body's axes.
+
+    A mass that is taken away may leave what no body has; then the nearest that one has is written.
+    """
     values, axes = np.linalg.eigh(tensor)
+    values = np.maximum(values, 1e-6)
+    values[2] = min(values[2], 0.999 * (values[0] + values[1]))
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] *= -1.0
     quat = np.zeros(4)
     mujoco.mju_mat2Quat(quat, axes.ravel())
-    body.iquat, body.inertia = quat, np.maximum(values, 1e-6)
+    body.iquat, body.inertia = quat, values
 
 
 def add_mass(body: Any, mass: float, place: NDArray[np.float64]) -> None:
