@@ -191,7 +191,14 @@ def test_bad_arguments_are_one_line_and_nothing_is_written(done, tmp_path, capsy
 def started(study, out, after):
     """A diagnosis in a process of its own, once it has kept `after` simulations."""
     command = [sys.executable, "-m", "mjchair", "diagnose", str(study), "--out", str(out)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # a shell's background job ignores Ctrl-C, and so would all that it starts
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     deadline = time.monotonic() + 300.0
     while len(kept(out)) < after and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.02)
@@ -209,7 +216,7 @@ def test_an_interrupted_run_goes_on_from_what_was_kept(done, tmp_path, monkeypat
 
     process = started(study, out, 2)
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=60)
+    _, said = process.communicate(timeout=300)
     assert process.returncode == 130
     assert said.startswith("mjchair: interrupted") and said.count("\n") == 1
     first = kept(out)
@@ -217,7 +224,7 @@ def test_an_interrupted_run_goes_on_from_what_was_kept(done, tmp_path, monkeypat
 
     process = started(study, out, len(first) + 3)
     process.send_signal(signal.SIGKILL)
-    process.communicate(timeout=60)
+    process.communicate(timeout=300)
     second = kept(out)
     assert first.items() <= second.items()  # none was made again
     assert {p.name for p in out.iterdir()} == {"unfinished"}
