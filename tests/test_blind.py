@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 BLIND = Path(__file__).parents[1] / "benchmarks" / "blind"
-SLICE = ("--seed", "60", "--count", "10", "--trials", "3", "--seconds", "3")
+SLICE = ("--seed", "60", "--count", "10", "--trials", "3", "--seconds", "4")
 sys.path.insert(0, str(BLIND))
 
 
