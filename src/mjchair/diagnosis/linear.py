@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +55,7 @@ class System:
       G: (windows, p, p). b: (windows, p). c: (windows,) chi2 of the residual.
       run: (windows,) index of the run. back: (nuisance,) where the model already stands from the
         centre of its priors, in standard deviations.
-      cells: slow parts, with the best nuisances put in.
+      cells: slow parts, with the best nuisances put in. known: sums over windows that were made.
     """
 
     names: list[str]
@@ -66,6 +67,7 @@ class System:
     run: NDArray[np.int64]
     back: Array
     cells: list[Cells] = field(default_factory=list)
+    known: dict[tuple[int, ...], Reduced] = field(default_factory=dict, init=False, repr=False)
 
     def index(self, names: Sequence[str]) -> list[int]:
         """Places of columns."""
@@ -261,6 +263,10 @@ class Reduced:
     centre: Array
     lean: Array
 
+    def index(self, names: Sequence[str]) -> list[int]:
+        """Places of columns."""
+        return [self.sums.where[n] for n in names]
+
     def gain(self, which: Sequence[int]) -> float:
         """Drop of chi2 that the columns bring."""
         found, coefficients = self._settled(which)
@@ -330,6 +336,11 @@ class Sums:
     wall: Array
     known: dict[Active, Reduced] = field(default_factory=dict)
 
+    @cached_property
+    def where(self) -> dict[str, int]:
+        """Places of the columns that are no nuisances, among themselves."""
+        return {n: i for i, n in enumerate(self.names[self.count :])}
+
     def eliminated(self, active: Active) -> Reduced:
         """The sums without nuisances; those of `active` stand on their walls."""
         if active not in self.known:
@@ -371,8 +382,15 @@ class Sums:
 
 
 def reduce(system: System, windows: Sequence[int] | NDArray[np.int64]) -> Reduced:
-    """Sum over the windows and eliminate the nuisances."""
-    w, n, free = list(windows), system.nuisance, system.free
+    """Sum over the windows and eliminate the nuisances; once for each choice of windows."""
+    key = tuple(int(i) for i in windows)
+    if key not in system.known:
+        system.known[key] = _reduce(system, list(key))
+    return system.known[key]
+
+
+def _reduce(system: System, w: list[int]) -> Reduced:
+    n, free = system.nuisance, system.free
     G, b = system.G[w].sum(axis=0), system.b[w].sum(axis=0)
     precision, wall = np.ones(n), np.full(n, WALL)
     precision[n - free :] = 1e-8 * np.maximum(np.diag(G)[n - free : n], 1e-12)

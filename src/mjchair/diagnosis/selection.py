@@ -49,8 +49,7 @@ class Hypothesis:
 
 def weigh(reduced: Reduced, starts: Sequence[Start]) -> Hypothesis:
     """The hypothesis that these effects are there."""
-    where = {n: i for i, n in enumerate(reduced.names)}
-    which = [where[c] for s in starts for c in s.columns]
+    which = reduced.index([c for s in starts for c in s.columns])
     block = reduced.G[np.ix_(which, which)]
     if (np.diag(block) < 1e-8).any():
         return Hypothesis(tuple(starts), 0.0, -np.inf)
@@ -61,21 +60,13 @@ def weigh(reduced: Reduced, starts: Sequence[Start]) -> Hypothesis:
 
 def physical(reduced: Reduced, hypothesis: Hypothesis) -> bool:
     """Whether the linear coefficients lie on the allowed side of every parameter."""
-    where = {n: i for i, n in enumerate(reduced.names)}
-    which = [where[c] for c in hypothesis.columns]
-    coefficients = reduced.solve(which)
-    at = 0
-    for start in hypothesis.starts:
-        mine = coefficients[at : at + len(start.columns)]
-        at += len(start.columns)
-        if len(start.columns) != len(start.free):
-            continue
-        for c, name in zip(mine, start.free, strict=True):
-            p = start.effect.parameter(name)
-            one_sided = p.low == p.neutral or p.high == p.neutral
-            if one_sided and c < 0.0 and start.effect.seeds is None:
-                return False
+    coefficients = reduced.solve(reduced.index(hypothesis.columns))
     for start, mine in _split(hypothesis, coefficients):
+        if start.effect.seeds is None and len(mine) == len(start.free):
+            for c, name in zip(mine, start.free, strict=True):
+                p = start.effect.parameter(name)
+                if c < 0.0 and p.neutral in (p.low, p.high):
+                    return False
         if start.effect.tags.get("place") and mine[0] < 0.0:
             return False
         if start.effect.name == "wind" and (mine < AGAINST).any():
@@ -93,8 +84,7 @@ def _split(hypothesis: Hypothesis, coefficients: Array) -> list[tuple[Start, Arr
 
 def terms(reduced: Reduced, hypothesis: Hypothesis, share: float = 1.0) -> tuple[Term, ...]:
     """The effects with values from a share of the linear fit's coefficients."""
-    where = {n: i for i, n in enumerate(reduced.names)}
-    coefficients = share * reduced.solve([where[c] for c in hypothesis.columns])
+    coefficients = share * reduced.solve(reduced.index(hypothesis.columns))
     return tuple(start.term(mine) for start, mine in _split(hypothesis, coefficients))
 
 
@@ -161,8 +151,7 @@ def _options(reduced: Reduced, starts: Sequence[Start]) -> list[Start]:
 
 def collinearity(reduced: Reduced, a: Hypothesis, b: Hypothesis) -> float:
     """Largest |cos| between what two hypotheses can show, 0 to 1."""
-    where = {n: i for i, n in enumerate(reduced.names)}
-    one, two = ([where[c] for c in h.columns] for h in (a, b))
+    one, two = (reduced.index(h.columns) for h in (a, b))
 
     def root(which: list[int]) -> Array:
         values, vectors = np.linalg.eigh(reduced.G[np.ix_(which, which)])

@@ -5,7 +5,7 @@ The fast part of the state is handed from window to window by the simulation its
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
@@ -106,8 +106,7 @@ def track(
     by_index: dict[int, list[int]] = {}
     for i, w in enumerate(shooter.windows):
         by_index.setdefault(w.index, []).append(i)
-    states: list[State | None] = [None] * count
-    firsts = first_states(shooter, shooter.base) if before is None else {}
+    states = _begun(shooter) if before is None else [s.copy() for s in before.states]
     predicted: list[Array] = [np.empty(0)] * count
     kept = before is not None and not anew
     slow: list[Array] = list(before.slow) if before and kept else [np.empty(0)] * count
@@ -115,13 +114,7 @@ def track(
     with installed():
         for index in sorted(by_index):
             members = by_index[index]
-            for i in members:
-                w = shooter.windows[i]
-                if before is not None:
-                    states[i] = before.states[i].copy()
-                elif states[i] is None:
-                    states[i] = firsts[w.run].copy()
-            search = {i: Search(_some(states[i])) for i in members}
+            search = {i: Search(states[i], states[i]) for i in members}
             for _ in range(ROUNDS):
                 _fit_round(
                     shooter, chair, (model, coarse), observer, search, white, predicted, slow, kept
@@ -137,13 +130,15 @@ def track(
                 outcome = again.get(i, outcomes[i])
                 predicted[i] = observer.observe(shooter, shooter.windows[i], outcome.predicted)
                 states[i], traces[i] = search[i].best, outcome.trace
-                _hand_over(shooter, model, i, outcome.trace, states)
-    return Track([_some(s) for s in states], predicted, slow, traces)
+                if before is None:
+                    _hand_over(shooter, model, i, outcome.trace, states)
+    return Track(states, predicted, slow, traces)
 
 
-def _some(state: State | None) -> State:
-    assert state is not None
-    return state
+def _begun(shooter: Shooter) -> list[State]:
+    """For every window the state at the first sample of its run."""
+    firsts = first_states(shooter, shooter.base)
+    return [firsts[w.run].copy() for w in shooter.windows]
 
 
 @dataclass
@@ -156,9 +151,9 @@ class Search:
     """
 
     state: State
-    best: State | None = None
+    best: State
     size: float = np.inf
-    change: Array | None = None
+    change: Array = field(default_factory=lambda: np.zeros(len(SLOW)))
 
     def judge(self, size: float) -> bool:
         """Take the misfit of the state; False where it is worse than the best."""
@@ -169,9 +164,9 @@ class Search:
 
 
 def _traced(
-    shooter: Shooter, model: mujoco.MjModel, which: list[tuple[int, State | None]]
+    shooter: Shooter, model: mujoco.MjModel, which: list[tuple[int, State]]
 ) -> dict[int, Outcome]:
-    jobs = [Job(model, shooter.windows[i], _some(state)) for i, state in which]
+    jobs = [Job(model, shooter.windows[i], state) for i, state in which]
     done = shooter.run(jobs, trace=True) if jobs else []
     return {i: outcome for (i, _), outcome in zip(which, done, strict=True)}
 
@@ -215,19 +210,14 @@ def _fit_round(
             observer.observe(shooter, w, o.predicted) for o in outcomes[n * each : n * each + each]
         ]
         if not s.judge(_size(shooter, w, seen[0], white)):
-            s.change = 0.3 * _there(s.change)  # a step too far
-            s.state = chair.moved(_some(s.best), s.change)
+            s.change = 0.3 * s.change  # a step too far
+            s.state = chair.moved(s.best, s.change)
             continue
         predicted[i] = seen[0]
         if not kept:
             slow[i] = np.stack([y - seen[1] for y in seen[2:]], axis=2)
         s.change = _step(shooter, i, s.state, seen[0], slow[i], white) * STEPS
         s.state = chair.moved(s.state, s.change)
-
-
-def _there(change: Array | None) -> Array:
-    assert change is not None
-    return change
 
 
 def _step(shooter: Shooter, i: int, state: State, seen: Array, slow: Array, white: Array) -> Array:
@@ -255,7 +245,7 @@ def _hand_over(
     model: mujoco.MjModel,
     i: int,
     trace: dict[str, Array],
-    states: list[State | None],
+    states: list[State],
 ) -> None:
     """The state where the next window's simulation starts."""
     w = shooter.windows[i]
