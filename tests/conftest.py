@@ -3,8 +3,18 @@ import numpy as np
 import pytest
 
 import mjchair
+from mjchair.report import gl
 
 SLALOM_STEPS = 1500
+
+
+def has_graphics() -> bool:
+    """Whether this machine draws offscreen."""
+    try:
+        gl.backend()
+    except gl.NoGraphicsError:
+        return False
+    return True
 
 
 @pytest.fixture(autouse=True)

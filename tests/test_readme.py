@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from conftest import has_graphics
 
 from mjchair import cli
-from mjchair.report import gl
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -24,14 +24,6 @@ def commands():
         line.partition("#")[0].strip() for block in blocks("sh") for line in block.splitlines()
     ]
     return [shlex.split(line) for line in lines if line]
-
-
-def has_graphics():
-    try:
-        gl.backend()
-    except gl.NoGraphicsError:
-        return False
-    return True
 
 
 @pytest.mark.parametrize("code", blocks("python"))

@@ -5,21 +5,13 @@ import imageio_ffmpeg
 import mujoco
 import numpy as np
 import pytest
+from conftest import has_graphics
 
 import mjchair
 from mjchair.errors import MjchairError
 from mjchair.report import gl
 from mjchair.report.forces import COLOURS, WheelForces, round_up, wheel_forces
 from mjchair.report.render import Film, samples_at, write_film, write_frame
-
-
-def has_graphics():
-    try:
-        gl.backend()
-    except gl.NoGraphicsError:
-        return False
-    return True
-
 
 drawn = pytest.mark.skipif(not has_graphics(), reason="no offscreen OpenGL on this machine")
 

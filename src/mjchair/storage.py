@@ -1,4 +1,4 @@
-"""Files are written whole or not at all: beside their place first, then renamed into it."""
+"""Files are written whole or not at all, beside their place first; and read within a bound."""
 
 from __future__ import annotations
 
@@ -82,3 +82,22 @@ def output_folder(path: str | os.PathLike[str], force: bool = False) -> Path:
     except OSError as error:
         raise MjchairError(f"cannot make {folder}: {error.strerror}") from None
     return folder
+
+
+def bounded(path: Path, largest: int, kind: str, reason: str) -> bytes:
+    """What is in a file, if that is no more than `largest` bytes.
+
+    Args:
+      kind: what is wanted, as "a tire file". reason: the end of the line about a larger one.
+
+    Raises:
+      MjchairError: it cannot be read, or is larger.
+    """
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(largest + 1)
+    except OSError as error:
+        raise MjchairError(f"cannot read {path}: {error.strerror}; give {kind}") from None
+    if len(data) > largest:
+        raise MjchairError(f"{path}: more than {reason}")
+    return data

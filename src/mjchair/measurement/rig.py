@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.errors import MjchairError, nearest
-from mjchair.storage import write_whole
+from mjchair.storage import bounded, write_whole
 
 Array = NDArray[np.float64]
 
@@ -129,15 +129,8 @@ def _cell(cell: object) -> str:
 
 
 def _text(path: Path) -> str:
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(LARGEST + 1)
-    except OSError as error:
-        raise MjchairError(f"cannot read {path}: {error.strerror}; give a rig table") from None
-    if len(data) > LARGEST:
-        raise MjchairError(
-            f"{path}: more than {LARGEST // 1_000_000} MB; a rig table has a row a run"
-        )
+    reason = f"{LARGEST // 1_000_000} MB; a rig table has a row a run"
+    data = bounded(path, LARGEST, "a rig table", reason)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:

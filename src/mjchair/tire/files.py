@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from mjchair.errors import MjchairError, nearest
-from mjchair.storage import write_whole
+from mjchair.storage import bounded, write_whole
 from mjchair.tire import tir, toml
 from mjchair.tire.tire import Tire
 
@@ -57,13 +57,8 @@ def _format(file: Path):  # type: ignore[no-untyped-def]
 def _text(file: Path) -> str:
     """The file's text: bounded, and text at all."""
     _format(file)
-    try:
-        with file.open("rb") as stream:
-            data = stream.read(LARGEST + 1)
-    except OSError as error:
-        raise MjchairError(f"cannot read {file}: {error.strerror}; give a tire file") from None
-    if len(data) > LARGEST:
-        raise MjchairError(f"{file}: more than {LARGEST // 1000} kB, which no tire file has")
+    reason = f"{LARGEST // 1000} kB, which no tire file has"
+    data = bounded(file, LARGEST, "a tire file", reason)
     if not data.strip():
         raise MjchairError(f"{file}: the file is empty")
     try:

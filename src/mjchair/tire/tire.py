@@ -145,10 +145,7 @@ class Tire:
 
     def block(self) -> NDArray[np.float64]:
         """The tire as numbers, in the order of mjchair.tire.block."""
-        header = np.zeros(block.HEADER)
-        header[block.TAG_AT] = block.TAG
-        header[block.VERSION_AT] = block.VERSION
-        header[block.FAMILY] = block.FAMILIES.index(self.family)
+        header = _header(self.family)
         for item in fields(self):
             if item.metadata:
                 header[getattr(block, item.name.upper())] = getattr(self, item.name)
@@ -176,14 +173,20 @@ class Tire:
         return replace(self, **changes)  # type: ignore[arg-type]
 
 
-def block_of(
-    family: str, coefficients: Mapping[str, float], radius: float = 0.3
-) -> NDArray[np.float64]:
-    """A block with nothing but its family and coefficients: unchecked, for fits."""
+def _header(family: str) -> NDArray[np.float64]:
+    """A header that says what it is, and nothing more."""
     header = np.zeros(block.HEADER)
     header[block.TAG_AT] = block.TAG
     header[block.VERSION_AT] = block.VERSION
     header[block.FAMILY] = block.FAMILIES.index(family)
+    return header
+
+
+def block_of(
+    family: str, coefficients: Mapping[str, float], radius: float = 0.3
+) -> NDArray[np.float64]:
+    """A block with nothing but its family and coefficients: unchecked, for fits."""
+    header = _header(family)
     header[[block.FRICTION_FACTOR, block.STIFFNESS_FACTOR, block.NOMINAL_LOAD]] = 1.0
     header[block.RADIUS] = radius
     return np.concatenate([header, packed(family, coefficients, radius)])
