@@ -1,10 +1,10 @@
 """Every figure of speed in one run: python benchmarks/bench.py [--only step batch ...] [--out DIR]
 
-What is compared is measured side by side, in turns, in one process: the machine's other work and
-its clock then disturb both alike. A number is the best of the turns, which other work disturbs
-least, and a ratio that of two best ones; where the difference is a few percent, it is the median
-of the turns' own ratios, with their quartiles. docs/benchmarks.md says what each number means.
-Writes benchmarks.md and benchmarks.json into --out.
+Two things that are compared are measured alternately in one process, so that other work on the
+machine and its clock disturb both in the same way. A figure is the best measurement, which is
+disturbed least, and a ratio is that of two best measurements. Where the difference is only a few
+percent, it is the median of the ratios of neighbouring measurements, with quartiles.
+docs/benchmarks.md says what each figure means. Writes benchmarks.md and benchmarks.json into --out.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ import numpy as np
 from mujoco import batch
 
 import mjchair
-from mjchair.model.looks import without_looks
+from mjchair.model.visual_geoms import without_looks
 from mjchair.storage import write_whole
 
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -81,7 +81,7 @@ def stepping(
 def side_by_side(
     turns: dict[str, Callable[[], float]], count: int = TURNS
 ) -> dict[str, np.ndarray]:
-    """Every turn, in turns: name -> (count,). Every other round goes the other way about."""
+    """Measure all alternately: name -> (count,). Every second round has the reverse order."""
     found: dict[str, list[float]] = {name: [] for name in turns}
     for turn in turns.values():
         turn()
@@ -100,7 +100,7 @@ def ratio(
 
 
 def overhead(found: dict[str, np.ndarray], a: str, b: str) -> tuple[float, str]:
-    """What a takes beyond b, in percent: median of the turns' own ratios, and how they spread."""
+    """Excess of a over b, in percent: median of the ratios of neighbours, and their spread."""
     more = 100.0 * (found[a] / found[b] - 1.0)
     low, middle, high = np.percentile(more, (25.0, 50.0, 75.0))
     return float(middle), f"quartiles {low:+.1f}, {high:+.1f} % of {more.size} pairs"
@@ -134,6 +134,7 @@ def step_time() -> list[Line]:
             "native": stepping(tireless(spec, 3), None),
             "bare": stepping(tireless(spec, 1), None),
             "slim": stepping(without_looks(spec).compile(), True),
+            "apart": stepping(mjchair.load_spec(merge_looks=False).compile(), True),
         }
     )
     plain = side_by_side({"tires": stepping(full, True), "plain": stepping(full, False, 20)}, 7)
@@ -158,8 +159,56 @@ def step_time() -> list[Line]:
             ">= 50",
             f"{plain['plain'].min():.0f} us",
         ),
-        Line("step without what is only seen", f"{us['slim']:.2f} us"),
+        Line(
+            "against the chair with its looks not merged",
+            f"{ratio(found, 'tires', 'apart'):.2f}",
+            "<= 0.8",
+            f"{us['apart']:.2f} us",
+        ),
+        Line(
+            "without what is only seen, against not merged",
+            f"{ratio(found, 'slim', 'apart'):.2f}",
+            "",
+            f"{us['slim']:.2f} us",
+        ),
     ]
+
+
+def drives() -> list[Line]:
+    """What the drive of a power chair costs: the chair under way by joystick and by torques."""
+    by_joystick = mjchair.load_spec("power", drive="normal").compile()
+    by_torques = mjchair.load_spec("power").compile()
+    found = side_by_side(
+        {
+            "drive": driving(by_joystick, {"joystick_x": 0.6, "joystick_y": 0.3}),
+            "torques": driving(by_torques, {"left_wheel": 3.0, "right_wheel": 4.0}),
+        }
+    )
+    more, spread = overhead(found, "drive", "torques")
+    return [
+        Line("step of the power chair with its drive", f"{found['drive'].min():.2f} us"),
+        Line("more than without, driven by torques", f"{more:.1f} %", "<= 5 %", spread),
+    ]
+
+
+def driving(model: mujoco.MjModel, controls: dict[str, float]) -> Callable[[], float]:
+    """A turn: microseconds a step of a chair under way, from the same state."""
+    data = mujoco.MjData(model)
+    for name, value in controls.items():
+        data.actuator(name).ctrl[0] = value
+    state = np.empty(mujoco.mj_stateSize(model, STATE))
+    with mjchair.installed():
+        mujoco.mj_step(model, data, nstep=400)
+        mujoco.mj_getState(model, data, state, STATE)
+
+    def turn() -> float:
+        mjchair.install()
+        mujoco.mj_setState(model, data, state, STATE)
+        begin = time.perf_counter()
+        mujoco.mj_step(model, data, nstep=STEPS)
+        return 1e6 * (time.perf_counter() - begin) / STEPS
+
+    return turn
 
 
 def first_step() -> list[Line]:
@@ -236,7 +285,7 @@ def environments() -> list[Line]:
 def rendering() -> list[Line]:
     """Pictures a second of mjchair's film against MuJoCo's bare renderer, same size."""
     from mjchair.report import gl
-    from mjchair.report.render import Film
+    from mjchair.report.film import Film
 
     width, height, pictures = 640, 360, 8
     recording = mjchair.simulate(
@@ -305,8 +354,8 @@ def per_second(picture: Callable[[int], object], count: int) -> float:
 def sweeps() -> list[Line]:
     """A sweep against bare mujoco.batch on the same models, states and controls.
 
-    Twice: against the batch inside it, of the same seconds, and against one that takes turns with
-    it. The first is not disturbed by what the machine does meanwhile; the second counts all.
+    Two comparisons: with the batch inside the sweep, measured at the same time, which other work
+    does not disturb; and with a separate batch, measured alternately, which includes all costs.
     """
     from mjchair import sweep
     from mjchair.simulation import batch as shared
@@ -319,8 +368,9 @@ def sweeps() -> list[Line]:
     )
     cases = study.cases()
     first = chunk.run_chunk(study, cases, threads=1)
-    models = [chunk._chair(chunk.key(case)) for case in cases]
-    states = [chunk._start(chunk.key(case), "{}") for case in cases]
+    keys = chunk.chair_keys(cases)
+    models = [chunk.compiled_model(key) for key in keys]
+    states = [chunk.start_state(*one).state for one in zip(keys, cases, strict=True)]
     steps = round(study.duration / models[0].opt.timestep)
     clock = models[0].opt.timestep * np.arange(steps)
     control = np.stack(
@@ -356,15 +406,16 @@ def sweeps() -> list[Line]:
     own, own_spread = overhead(found, "swept", "inside")
     more, spread = overhead(found, "swept", "bare")
 
-    def built() -> float:
-        chunk._chair.cache_clear()
-        chunk._start.cache_clear()
+    def compile_and_settle() -> float:
+        chunk.clear_caches()
         begin = time.process_time()
         mjchair.install()
-        for case in (cases[0], cases[-1]):
-            chunk._start(chunk.key(case), "{}")
+        two = [cases[0], cases[-1]]
+        for key, case in zip(chunk.chair_keys(two), two, strict=True):
+            chunk.start_state(key, case)
         return 1e3 * (time.process_time() - begin) / 2
 
+    settling = compile_and_settle()
     lines = [
         Line(
             "sweep against the mujoco.batch in it, 10 s a chair",
@@ -373,7 +424,7 @@ def sweeps() -> list[Line]:
             f"{own_spread}; {1e3 * found['bare'].min() / len(cases):.0f} ms a simulation",
         ),
         Line("the same against one in turns with it", f"{more:+.1f} %", "<= 5 %", spread),
-        Line("compile and settle another chair, once for all its seeds", f"{built():.0f} ms"),
+        Line("compile and settle another chair, once for all its seeds", f"{settling:.0f} ms"),
     ]
     return lines + dask(study, first)
 
@@ -494,6 +545,7 @@ def fields() -> list[Line]:
 
 PARTS: dict[str, Callable[[], list[Line]]] = {
     "step": step_time,
+    "drive": drives,
     "start": first_step,
     "batch": batches,
     "tasks": environments,
@@ -505,7 +557,7 @@ PARTS: dict[str, Callable[[], list[Line]]] = {
 
 
 def machine() -> dict[str, str]:
-    """What it ran on."""
+    """The machine and the versions."""
     name = platform.processor() or platform.machine()
     if Path("/proc/cpuinfo").is_file():
         for line in Path("/proc/cpuinfo").read_text().splitlines():

@@ -1,7 +1,7 @@
 """Where the time of a step goes: python benchmarks/profile_step.py
 
-MuJoCo's own timers, which cost a little themselves, for the chair on a plane and on a height field;
-and the tires' share, from steps with and without the callbacks.
+Uses MuJoCo's own timers, which take a little time themselves, for the chair on a plane and on a
+height field. The share of the tires comes from steps with and without the callbacks.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numba import cfunc, types
 
 import mjchair
-from mjchair.model.looks import without_looks
+from mjchair.model.visual_geoms import without_looks
 
 STAGES = {
     "kinematics": mujoco.mjtTimer.mjTIMER_POS_KINEMATICS,
@@ -57,7 +57,7 @@ def profile(model: mujoco.MjModel) -> tuple[float, dict[str, float]]:
     mujoco.mj_getState(model, data, state, STATE)
     for timer in data.timer:
         timer.duration, timer.number = 0.0, 0
-    mujoco.set_mjcb_time(processor_time.ctypes)  # native: one in Python would cost what it times
+    mujoco.set_mjcb_time(processor_time.ctypes)  # native: a Python timer is too slow
     try:
         for _ in range(ROUNDS):
             mujoco.mj_setState(model, data, state, STATE)

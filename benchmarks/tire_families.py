@@ -2,18 +2,13 @@
 
     python benchmarks/tire_families.py
 
-The least of several runs, in turn, so that other work on the machine disturbs all alike.
+The shortest of several runs, measured alternately, so that other work disturbs all in the same way.
 """
 
-import sys
 import time
-from pathlib import Path
 
 import mujoco
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-
-from test_mf61 import book
+from mf_equations import book
 
 import mjchair
 from mjchair.tire import Tire

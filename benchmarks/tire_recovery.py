@@ -7,15 +7,11 @@ For the causes, angles of both signs are measured as well, and the wheel turned 
 """
 
 import argparse
-import sys
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-
 from rig_data import made
 
 from mjchair.identification.curves import curve

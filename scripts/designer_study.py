@@ -1,18 +1,18 @@
 """Energy and turning effort of a manual chair over axle position, casters, tire pressure and floor.
 
-What a designer chooses against what the rider pays. Two sweeps of the same 72 chairs:
+In: the axes below. Out: designer_study.png, the Parquet datasets `coast` and `turn` (a second run
+uses them again), and on standard output the sentence of docs/many_chairs.md on the axle.
 
-- rolling: every chair coasts from 1.2 m/s for 4 s on the straight. Drag, which is the energy a
-  metre takes, follows from the speed it loses (for the chair's whole mass; the wheels' spin is
-  3 % more and left out).
-- turning: every chair starts at rest with its casters behind and turns on the spot, with opposite
-  torques of 5 N m for 2.5 s. The energy a full turn takes is the work of the wheels over the angle
-  turned, less the kinetic energy that it still has.
+Two sweeps of the same 72 chairs show how a designer's choices affect the energy that is needed:
 
-The floors: hard (the tire files' own rolling resistance) and a low-pile carpet, which adds 0.014 to
-it (assumption, inside the 0.01-0.05 of mjchair's effect `surface_patch`).
+- rolling: every chair coasts straight ahead from 1.2 m/s for 4 s. The energy for a metre is the
+  drag, which is the deceleration times the mass (the spin of the wheels, 3 %, is left out).
+- turning: every chair starts at rest with trailing casters and turns on the spot by opposite
+  torques of 5 N m for 2.5 s. The energy of a full turn is the work of the torques less the kinetic
+  energy at the end, over the angle turned, times 2 pi.
 
-Writes designer_study.png, and the Parquet datasets `coast` and `turn`, which a second run reuses.
+The floors are a hard floor (rolling resistance of the tire files) and a low-pile carpet, which adds
+0.014 to it (assumption, within the 0.01-0.05 of mjchair's effect `surface_patch`).
 """
 
 from __future__ import annotations
@@ -26,8 +26,10 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+import mjchair
 from mjchair import sweep
-from mjchair.report.plots import save
+from mjchair.model.mass_distribution import mass_distribution
+from mjchair.report.figure_file import save
 from mjchair.sweep.measures import Sensed, standard
 
 AXES = {
@@ -38,25 +40,32 @@ AXES = {
 }
 FLOORS = {0.0: "hard floor", 0.014: "low-pile carpet"}
 EVERYWHERE = {"surface_patch.x": 0.0, "surface_patch.y": 0.0, "surface_patch.radius": 20.0}
-MASS = 90.0  # kg, chair and occupant
-YAW_INERTIA = 5.63  # kg m^2, of the whole chair about the vertical through its centre of mass
-AHEAD = 0.12  # m, centre of mass before the axle in its standard place
 TORQUE = 5.0  # N m
 
 
+def coasting(sensed: Sensed) -> dict[str, float]:
+    """The standard measures, and the energy that rolling a metre takes (J)."""
+    measures = standard(sensed)
+    mass = mass_distribution(sensed.model).mass
+    return {**measures, "energy_per_metre_rolled": mass * measures["deceleration"]}
+
+
 def turning(sensed: Sensed) -> dict[str, float]:
-    """The standard measures, and the energy of a full turn (J) without what is still moving."""
-    found = standard(sensed)
-    speed = sensed.channels["imu_gyro.z"][-1]
-    arm = AHEAD - float(sensed.case["axle_position"])
-    kept = 0.5 * (YAW_INERTIA + MASS * arm * arm) * speed * speed
-    angle = abs(found["turned"])
-    return {**found, "energy_per_turn": 2.0 * np.pi * (found["work"] - kept) / angle}
+    """The standard measures, and the energy of a full turn (J) without the kinetic energy."""
+    measures = standard(sensed)
+    yaw_rate = sensed.channels["imu_gyro.z"][-1]
+    chair = mass_distribution(sensed.model)
+    kinetic = 0.5 * (chair.yaw_inertia + chair.mass * chair.ahead**2) * yaw_rate**2
+    angle = abs(measures["turned"])
+    return {**measures, "energy_per_turn": 2.0 * np.pi * (measures["work"] - kinetic) / angle}
 
 
 def studies() -> dict[str, sweep.Study]:
+    """The two sweeps: name -> study."""
     return {
-        "coast": sweep.Study(axes=AXES, duration=4.0, fixed={**EVERYWHERE, "speed": 1.2}),
+        "coast": sweep.Study(
+            axes=AXES, duration=4.0, fixed={**EVERYWHERE, "speed": 1.2}, measures=coasting
+        ),
         "turn": sweep.Study(
             axes=AXES,
             duration=2.5,
@@ -66,15 +75,15 @@ def studies() -> dict[str, sweep.Study]:
     }
 
 
-def curves(axes, table, measure, factor):
-    """One line a pressure and caster size over the axle position."""
+def curves(axes, table, measure):
+    """Draw a measure over the axle position, a line for each pressure and caster size."""
     colours = {0.25: "#b2182b", 0.5: "#ef8a62", 1.0: "#2166ac"}
     styles = {0.05: ":", 0.0625: "--", 0.075: "-"}
     for pressure, colour in colours.items():
         for radius, style in styles.items():
             chosen = (table["tire_pressure"] == pressure) & (table["caster_radius"] == radius)
-            x, y = 100.0 * table["axle_position"][chosen], factor * table[measure][chosen]
-            axes.plot(x, y, style, color=colour)
+            axle_cm = 100.0 * table["axle_position"][chosen]
+            axes.plot(axle_cm, table[measure][chosen], style, color=colour)
     axes.grid(alpha=0.3)
 
 
@@ -89,13 +98,39 @@ def columns(table):
     return {name: np.asarray(table[name]) for name in table.column_names}
 
 
+def savings(turn):
+    """Floor -> least and most (%) by which the foremost axle makes a turn lighter, over all chairs.
+
+    Args:
+      turn: columns of the sweep `turn`.
+    """
+    first, last = min(AXES["axle_position"]), max(AXES["axle_position"])
+    least_and_most = {}
+    for coefficient, floor in FLOORS.items():
+        rows = on_floor(turn, coefficient)
+        order = np.lexsort((rows["caster_radius"], rows["tire_pressure"]))
+        axle, energy = rows["axle_position"][order], rows["energy_per_turn"][order]
+        saved = 100.0 * (1.0 - energy[axle == last] / energy[axle == first])
+        least_and_most[floor] = float(saved.min()), float(saved.max())
+    return least_and_most
+
+
+def sentence(turn):
+    """The sentence of docs/many_chairs.md about the axle."""
+    ranges = [
+        f"{low:.0f} to {high:.0f} % on a {floor}" for floor, (low, high) in savings(turn).items()
+    ]
+    forward = 100.0 * max(AXES["axle_position"])
+    return f"an axle {forward:.0f} cm forward saves {' and '.join(ranges)}"
+
+
 def figure(coast, turn):
     drawn, grid = plt.subplots(2, 2, figsize=(10.5, 7.5), sharex=True, sharey="row")
     drawn.set_layout_engine("constrained")
     for column, (coefficient, floor) in enumerate(FLOORS.items()):
         rows = [on_floor(table, coefficient) for table in (coast, turn)]
-        curves(grid[0, column], rows[0], "deceleration", MASS)
-        curves(grid[1, column], rows[1], "energy_per_turn", 1.0)
+        curves(grid[0, column], rows[0], "energy_per_metre_rolled")
+        curves(grid[1, column], rows[1], "energy_per_turn")
         grid[0, column].set_title(floor)
         grid[1, column].set_xlabel("rear axle forward of the standard place (cm)")
     for row in grid:
@@ -109,7 +144,10 @@ def figure(coast, turn):
         plt.Line2D([], [], color="k", ls=s, label=f"{d} casters") for d, s in styles.items()
     ]
     drawn.legend(handles=handles, loc="outside lower center", ncols=6, frameon=False)
-    drawn.suptitle("Manual chair, 90 kg: what the axle, the casters, the tires and the floor cost")
+    mass = mass_distribution(mjchair.load_spec().compile()).mass
+    drawn.suptitle(
+        f"Manual chair, {mass:.0f} kg: what the axle, the casters, the tires and the floor cost"
+    )
     return drawn
 
 
@@ -133,6 +171,7 @@ def main() -> None:
     }
     save(figure(tables["coast"], tables["turn"]), args.out / "designer_study.png")
     print(args.out / "designer_study.png")
+    print(sentence(tables["turn"]))
 
 
 if __name__ == "__main__":

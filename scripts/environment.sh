@@ -3,8 +3,8 @@
 set -euo pipefail
 python=$1 venv=$2
 
-"$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || {
-    echo "mjchair needs Python 3.11 or newer; found: ${python:-none}. Install python3.11." >&2
+"$python" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' 2>/dev/null || {
+    echo "mjchair needs Python 3.11 or 3.12; found: ${python:-none}. Install python3.11." >&2
     exit 1
 }
 if ! "$python" -c 'import ensurepip' 2>/dev/null; then
@@ -18,5 +18,8 @@ if ! "$python" -c 'import ensurepip' 2>/dev/null; then
 fi
 rm -rf "$venv"
 "$python" -m venv "$venv"
-"$venv/bin/pip" install --quiet --requirement requirements.lock
+# the lock names all that is used; what kineticstoolkit wants besides (PyQt5, 200 MB, for windows; a
+# look for news over the network at import) stays away
+"$venv/bin/pip" install --quiet --no-deps --requirement requirements.lock
 "$venv/bin/pip" install --quiet --no-deps --no-build-isolation --editable .
+"$venv/bin/python" scripts/compile_tires.py  # so that no first run waits for them

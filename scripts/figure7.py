@@ -21,7 +21,8 @@ from pathlib import Path
 import numpy as np
 
 import mjchair
-from mjchair.report import plots
+from mjchair.report.figure_file import save
+from mjchair.report.trajectory import trajectory
 from mjchair.storage import output_folder
 
 STRONG, WEAK = 16.0, 5.0  # N m, peak of a push
@@ -73,8 +74,8 @@ def main(tire: str, name: str, title: str, caption: str) -> int:
     recording.save(folder / f"{name}.npz")
     stiffness = abs(float(lateral_stiffness(tire)))
     text = caption.format(stiffness=stiffness, slip=largest_slip(recording))
-    figure = plots.trajectory(recording, title, text, arrows=24, components=("lateral",))
-    plots.save(figure, folder / f"{name}.png")
+    figure = trajectory(recording, title, text, arrows=24, components=("lateral",))
+    save(figure, folder / f"{name}.png")
     print(f"{recording.describe()}; {Path(folder) / name}.png")
     print(text)
     return 0

@@ -1,9 +1,9 @@
-"""One worked story: an effect is hidden in simulated runs, found, and put into the chair.
+"""A complete example: an effect is hidden in simulated runs, diagnosed, and put into the chair.
 
     python scripts/hidden_effect.py --out out/hidden_effect
 
-`hide` holds the pushed run out: no fit sees it, so it shows whether the corrected chair is right
-where it was not made to be. Each step is what the command line does; see docs/diagnosis.md.
+`hide` holds the pushed run out: no fit uses it, so it is an independent check of the corrected
+chair. Each step is a command of the command line; see docs/diagnosis.md.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def main() -> int:
 
 
 def explain_by(study: Path, model: Path) -> None:
-    """Let the study be explained by another chair."""
+    """Use another chair as the model of the study."""
     file = study / "study.toml"
     lines = file.read_text().splitlines()
     lines[0] = f'model = "{model.resolve()}"'  # brings its own floor

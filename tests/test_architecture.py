@@ -12,17 +12,18 @@ PACKAGE = Path(mjchair.__file__).parent
 # bottom first; those of one row stand side by side and do not know each other
 FLOORS = [
     ("errors",),
-    ("storage",),
-    ("tire",),
+    ("csv_table", "storage", "toml_file", "units"),
+    ("tire", "rider", "drive"),
     ("model",),
     ("engine",),
     ("simulation",),
     ("measurement",),
+    ("motion",),
     ("identification",),
     ("effects",),
-    ("diagnosis",),
+    ("diagnosis", "practice"),
     ("report",),
-    ("tasks", "sweep"),
+    ("tasks", "sweep", "testlab"),
     ("commands",),
     ("cli",),
     ("__init__", "__main__"),
@@ -54,6 +55,21 @@ def floors_of(path: Path) -> set[str]:
     return found
 
 
+# the rooms of the diagnosis, in the same way
+ROOMS = [
+    ("rules",),
+    ("data",),
+    ("replay",),
+    ("fit",),
+    ("explain",),
+    ("next_experiment",),
+    ("result",),
+    ("evidence", "material"),
+    ("decide",),
+    ("diagnose",),
+]
+ROOM_LEVEL = {name: level for level, row in enumerate(ROOMS) for name in row}
+
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 
@@ -63,6 +79,21 @@ def test_imports_go_down(path):
     assert own in LEVEL, f"{own} is on no floor: give it one in this file"
     for other in floors_of(path) - {own}:
         assert LEVEL[other] < LEVEL[own], f"{own} imports {other}, which is not beneath it"
+
+
+DIAGNOSIS = [p for p in FILES if floor(p) == "diagnosis"]
+
+
+@pytest.mark.parametrize("path", DIAGNOSIS, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_data_flows_up_through_the_rooms_of_the_diagnosis(path):
+    parts = path.relative_to(PACKAGE / "diagnosis").parts
+    own = parts[0].removesuffix(".py")
+    if own == "__init__":
+        return
+    for name in imports(path):
+        other = name.split(".")
+        if other[:2] == ["mjchair", "diagnosis"] and other[2] != own:
+            assert ROOM_LEVEL[other[2]] < ROOM_LEVEL[own], f"{own} imports {name}"
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))

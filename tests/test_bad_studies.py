@@ -88,7 +88,7 @@ CASES = {
     ),
     "a clock in ms": (
         {"columns": coast(), "time": 1000.0 * TIME},
-        r"a sample comes every 20 s; .* is it in ms\? name it time \[ms\]",
+        r"in steps of 20, which looks like milliseconds; name the column 'time \[ms\]'",
     ),
     "fewer samples than a window holds": (
         {"columns": {n: v[::25] for n, v in coast().items()}, "time": TIME[::25]},
@@ -195,7 +195,7 @@ CASES = {
     ),
     "a word for the grade": (
         {"columns": coast(), "head": HEAD + 'scene = "ramp"\ngrade = "steep"\n'},
-        "grade is 'steep'; it must be a number",
+        "grade is 'steep'; it must be a rise over run",
     ),
     "an unknown scene": (
         {"columns": coast(), "head": HEAD + 'scene = "flatt"\n'},

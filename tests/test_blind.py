@@ -12,7 +12,6 @@ import pytest
 
 BLIND = Path(__file__).parents[1] / "benchmarks" / "blind"
 SLICE = ("--seed", "60", "--count", "10", "--trials", "3", "--seconds", "4")
-sys.path.insert(0, str(BLIND))
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +21,7 @@ def lines(tmp_path_factory):
     command = [sys.executable, str(BLIND / "run.py"), *SLICE, "--work", str(work)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    path = work / "results_60.jsonl"
+    path = work / "results_mujoco_60.jsonl"
     assert "| figure | aim | result |" in done.stdout
     again = subprocess.run(command, capture_output=True, text=True, check=True)
     assert again.stdout.startswith("| figure"), "a second start has nothing left to run"

@@ -52,11 +52,17 @@ def test_simulate_writes_a_recording_a_table_and_figures(there, capsys):
         ["--scene", "cross_slope", "--grade", "5%", "--tilt", "gravity", "--speed", "0.5"],
         ["--tire", "wheels=wheelchair_a0_148", "--tire", "casters=caster"],
         ["--timestep", "0.001", "--sample-rate", "100"],
+        ["--set", "occupant_mass=82", "--set", "camber=3 deg"],
+        ["--model", "power", "--set", "seat_angle=8deg"],
+        ["--scene", "kerb", "--step", "20mm"],
+        ["--scene", "hfield", "--heights", "uneven:rms=5mm,seed=2"],
+        ["--scene", "hfield", "--heights", "floor.csv"],
         ["--position", "1,2", "--heading", "-0.5", "--speed", "0.5", "--yaw-rate", "0.1"],
     ],
     ids=" ".join,
 )
 def test_any_chair_scene_tire_and_input(there, capsys, options):
+    write(there / "floor.csv", "0,0,0\n0,0.001,0\n0,0,0\n")
     code, out = run("simulate", *options, "--duration", "0.1", "--out", "run", capsys=capsys)
     assert code == 0, out.err
 
@@ -95,6 +101,17 @@ BAD = {
     "no SmartWheel file": (["--smartwheel", "drive.csv"], "a SmartWheel file has 24"),
     "unknown option": (["--sped", "1"], "unrecognized arguments: --sped"),
     "duration": (["--duration", "-1"], "duration is -1 s"),
+    "unknown parameter": (["--set", "cambre=3deg"], "did you mean 'camber'"),
+    "no assignment": (["--set", "camber"], "--set 'camber' is not NAME=VALUE"),
+    "parameter twice": (["--set", "toe=0", "--set", "toe=1deg"], "--set gives toe twice"),
+    "parameter unit": (["--set", "camber=3kg"], "its unit must be one of rad, deg"),
+    "parameter of another chair": (
+        ["--model", "power", "--set", "anti_tippers=no"],
+        "anti_tippers: the model has no anti-tippers",
+    ),
+    "step of the flat": (["--step", "20mm"], "the scene has no geom 'step'"),
+    "no heights": (["--scene", "hfield", "--heights", "gone.csv"], "cannot read gone.csv"),
+    "words for heights": (["--scene", "hfield", "--heights", "drive.csv"], "no table of numbers"),
 }
 
 
@@ -215,3 +232,18 @@ def test_the_module_is_the_command(there):
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1 and "Traceback" not in done.stderr
     assert done.stdout == ""
+
+
+def test_set_reaches_the_chair(there, capsys):
+    made = ("--set", "occupant_mass=82", "--set", "camber=3deg", "--duration", "0.1")
+    assert run("simulate", *made, "--out", "run", capsys=capsys)[0] == 0
+    recording = mjchair.load_recording(there / "run" / "recording.npz")
+    assert recording.model.load().body("chair").mass == pytest.approx(92.0)
+    assert abs(recording["left_wheel_tire.gamma"][-1]) == pytest.approx(np.radians(3.0), rel=0.02)
+
+
+def test_models_lists_the_parameters_of_a_chair(capsys):
+    from mjchair.model.parameters import NAMES
+
+    code, out = run("models", "parameters", capsys=capsys)
+    assert code == 0 and all(name in out.out for name in NAMES)

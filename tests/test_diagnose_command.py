@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 
+import browser
 import mujoco
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ import pytest
 import mjchair
 from mjchair import cli
 from mjchair.commands.diagnose import CANDIDATE, GAP, TOP
-from mjchair.diagnosis.store import Store
+from mjchair.diagnosis.replay.cache import Store
 from mjchair.effects.library import find
 
 CHANNELS = {"left_wheel_speed": 0.02, "right_wheel_speed": 0.02, "imu_gyro.z": 0.01}
@@ -88,6 +89,22 @@ def test_report_opens_offline(done):
     assert not re.search(r"https?://|<script|<link|@import|url\(", page)
     assert page.count("data:image/png;base64,") == len(list(done[1].glob("*.png")))
     assert [int(n) for n in re.findall(r"<h2>(\d)\.", page)] == [1, 2, 3, 4, 5, 6, 7, 8]
+
+
+@pytest.mark.skipif(browser.program() is None, reason="no Chromium on this machine")
+def test_the_report_carries_a_replay_of_a_run(done):
+    """Before, after and the measured run in one scene; nothing is asked of the network."""
+    with browser.Page(done[1] / "report.html", 900, 700) as page:
+        page.value("window.mjchair.ready.then(() => 0)")
+        tracks = page.value("mjchair.tracks")
+        assert tracks[-1] == "measured" and len(tracks) in (2, 3)
+        measured, chair = (
+            np.array(page.value(f"mjchair.pose(3, 'chair', {k})"))[:3] for k in (len(tracks) - 1, 0)
+        )
+        start = np.array(page.value("mjchair.pose(0, 'chair', 0)"))[:3]
+        assert np.linalg.norm(measured - start) == pytest.approx(3.0, abs=0.6)  # m, slowing down
+        assert np.linalg.norm(measured - chair) < (0.15 if len(tracks) == 3 else 1.5)
+        assert page.requests == [] and page.errors == []
 
 
 def test_the_corrected_chair_rolls(done, tmp_path):

@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 
 import mjchair
-from mjchair.effects.library import find, library, names
+from mjchair.effects.library import MECHANICAL, find, library, names
 from mjchair.errors import MjchairError
 
 CONTRACT = {
     "rolling_resistance": {"coefficient"},
     "bearing_friction": {"coulomb", "viscous"},
     "air_drag": {"drag_area"},
-    "wind": {"x", "y"},
+    "wind": {"x", "y", "drag_area"},
     "floor_slope": {"x", "y"},
     "toe": {"symmetric", "asymmetric"},
     "camber": {"angle"},
@@ -29,7 +29,10 @@ CONTRACT = {
     "torque_gain": {"left", "right"},
     "drive_lag": {"time_constant"},
     "back_emf": {"coefficient"},
-    "rider_sway": {"mass", "amplitude", "frequency", "phase"},
+    "weak_motor": {"left", "right"},
+    "low_battery": {"used"},
+    "dragging_brake": {"left", "right"},
+    "rider_motion": {"mass", "amplitude", "frequency", "phase"},
     "surface_patch": {"x", "y", "radius", "coefficient"},
 }
 
@@ -54,6 +57,53 @@ def test_an_effect_at_neutral_changes_nothing_and_at_its_start_survives_xml(effe
         effect.apply(spec, start.combine(np.ones(len(start.points))))
         saved = mujoco.MjModel.from_xml_string(spec.to_xml())
         np.testing.assert_allclose(_rolled(saved), _rolled(spec.compile()), atol=1e-5)
+
+
+@pytest.fixture(scope="module")
+def driven():
+    return mjchair.load_spec("power", "ramp", grade=0.1, drive="normal")
+
+
+FAULTS = [e for e in MECHANICAL if e.drive]
+
+
+def _going(spec, duration=2.0):
+    return mjchair.simulate(spec, {"joystick_x": 1.0}, duration)
+
+
+@pytest.mark.parametrize("effect", FAULTS, ids=lambda e: e.key)
+def test_a_fault_of_a_drive_at_neutral_changes_nothing_and_survives_xml(driven, effect):
+    same, faulty = driven.copy(), driven.copy()
+    effect.apply(same, effect.neutral())
+    effect.apply(faulty, effect.example)
+    sound, broken = _going(driven, 1.2), _going(faulty, 1.2)
+    assert np.array_equal(_going(same, 1.2).qpos, sound.qpos)
+    assert np.abs(broken.qpos - sound.qpos).max() > 1e-4
+    saved = mujoco.MjModel.from_xml_string(faulty.to_xml())
+    assert np.array_equal(_going(saved, 1.2).qpos, broken.qpos)
+    with pytest.raises(mjchair.MjchairError, match="no drive"):
+        effect.apply(mjchair.load_spec("power"), effect.example)
+
+
+def test_a_weak_motor_turns_the_chair_to_its_side_and_a_low_battery_slows_it(driven):
+    ends = {}
+    for effect in FAULTS:
+        spec = driven.copy()
+        effect.apply(spec, effect.example)
+        ends[effect.name] = _going(spec)
+    sound = _going(driven)
+    assert ends["weak_motor"]["heading"][-1] > 0.02  # its left one is the weak one
+    assert ends["dragging_brake"]["heading"][-1] > 0.02
+    assert ends["low_battery"]["velocity.x"][-1] < sound["velocity.x"][-1] - 0.02
+    assert abs(ends["low_battery"]["heading"][-1]) < 1e-3
+
+
+def test_the_library_shows_what_a_chair_can_have(driven):
+    powered = {e.name for e in library(chair=driven)}
+    assert {"weak_motor", "low_battery", "dragging_brake"} <= powered
+    assert not powered & {"torque_gain", "back_emf", "drive_lag"}
+    plain = {e.name for e in library(chair=mjchair.load_spec("power"))}
+    assert not plain & {"weak_motor", "low_battery", "dragging_brake"} and "torque_gain" in plain
 
 
 def _rolled(model):

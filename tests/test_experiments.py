@@ -7,16 +7,22 @@ import numpy as np
 import pytest
 
 import mjchair
-from mjchair.diagnosis import advice, experiments, workflow
-from mjchair.diagnosis.experiments import Evidence, Experiment, Plan
-from mjchair.diagnosis.fitting import Fit, Term, refit
-from mjchair.diagnosis.linear import Whitener
-from mjchair.diagnosis.manoeuvres import LIBRARY, Setting, possible, setting
-from mjchair.diagnosis.shooting import Shooter
-from mjchair.diagnosis.study import Run, make_study
-from mjchair.diagnosis.tracking import track
+from mjchair.diagnosis import diagnose
+from mjchair.diagnosis.data.study import Run, make_study
+from mjchair.diagnosis.explain.candidates import Around, collect
+from mjchair.diagnosis.explain.column_ids import Driver, Quantity
+from mjchair.diagnosis.fit.nonlinear import refit
+from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.diagnosis.next_experiment import design, wording
+from mjchair.diagnosis.next_experiment.design import Evidence, Experiment, Plan
+from mjchair.diagnosis.next_experiment.manoeuvres import LIBRARY, Setting, possible, setting
+from mjchair.diagnosis.replay.simulator import WindowSimulator
+from mjchair.diagnosis.replay.window_states import track
+from mjchair.effects.effect import Effect, Parameter
 from mjchair.effects.library import find
+from mjchair.errors import MjchairError
 from mjchair.measurement.trial import Trial
+from mjchair.model import inertials
 from mjchair.simulation.initial import Initial
 
 NOISE = {
@@ -44,8 +50,8 @@ def measured(rng, name, start, seconds, inputs=None):
 def fitted(bench, found, name, free):
     effect = find(name)
     start = {**effect.neutral(), free[0]: 0.001}
-    fit = Fit(bench.nuisances, {}, (Term(effect, start, free),))
-    return refit(bench, fit, found, rounds=1)
+    variant = Variant(bench.nuisances, {}, (Term(effect, start, free),))
+    return refit(bench, variant, found, rounds=1)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +59,7 @@ def one_way():
     """Coasts in one heading, and three explanations of them."""
     rng = np.random.default_rng(3)
     runs = [measured(rng, f"coast {k}", start, 4.0) for k, start in enumerate(ONE_WAY)]
-    bench, found = workflow.prepare(make_study(mjchair.load_spec(), runs, NOISE))
+    bench, found = diagnose.prepare(make_study(mjchair.load_spec(), runs, NOISE))
     rolling = fitted(bench, found, "rolling_resistance", ("coefficient",))
     slope = fitted(bench, found, "floor_slope", ("x", "y"))
     bearing = fitted(bench, found, "bearing_friction", ("coulomb",))
@@ -63,7 +69,7 @@ def one_way():
 @pytest.fixture(scope="module")
 def against_slope(one_way):
     _, _, bench, (rolling, slope, _) = one_way
-    return experiments.plan(bench, rolling, [slope], doubts=())
+    return design.plan(bench, rolling, [slope], doubts=())
 
 
 def test_a_slope_is_told_from_rolling_by_another_heading(against_slope):
@@ -76,17 +82,17 @@ def test_a_slope_is_told_from_rolling_by_another_heading(against_slope):
 def test_what_is_promised_is_what_the_experiment_gives(one_way, against_slope):
     rng, runs, bench, (rolling, slope, _) = one_way
     best = against_slope.best
-    here = setting(bench.shooter.study)
+    here = setting(bench.simulator.study)
     start = here.initial(best.manoeuvre)
     further = measured(rng, "new", start, best.manoeuvre.seconds)
     study = make_study(mjchair.load_spec(), [*runs, further], NOISE)
-    shooter = Shooter(study)
-    again = replace(bench, shooter=shooter, whitener=Whitener(shooter, bench.noise))
+    simulator = WindowSimulator(study)
+    again = replace(bench, simulator=simulator)
     totals = []
     for before in (rolling, slope):
-        model = shooter.compile(before.fit.edit)
-        found = track(shooter, model, bench.noise)
-        totals.append(refit(again, before.fit, found, rounds=1).total)
+        model = simulator.compile(before.variant.edit)
+        found = track(simulator, model, bench.noise)
+        totals.append(refit(again, before.variant, found, rounds=1).total)
     grown = (totals[1] - totals[0]) - (slope.total - rolling.total)
     t = best.least
     assert abs(grown - t) < 3.0 * 2.0 * math.sqrt(t) + 0.1 * t
@@ -94,7 +100,7 @@ def test_what_is_promised_is_what_the_experiment_gives(one_way, against_slope):
 
 def test_a_load_tells_rolling_from_bearings(one_way):
     _, _, bench, (rolling, _, bearing) = one_way
-    found = experiments.plan(bench, rolling, [bearing])
+    found = design.plan(bench, rolling, [bearing])
     order = [e.manoeuvre.name for e in found.experiments]
     assert "loaded coast" in order[:3]
     assert order.index("loaded coast") < order.index("coast")
@@ -104,8 +110,57 @@ def test_a_load_tells_rolling_from_bearings(one_way):
 def test_nothing_separates_a_chair_from_itself(one_way):
     _, _, bench, (rolling, _, _) = one_way
     few = [BY_NAME["coast reversed"], BY_NAME["loaded coast"]]
-    found = experiments.plan(bench, rolling, [rolling], few)
+    found = design.plan(bench, rolling, [rolling], few)
     assert max(e.least for e in found.experiments) < 1e-3
+
+
+def _too_thin(spec, size):
+    """Make an inertia that no body has, where size is not 0."""
+    if size:
+        chair = inertials.explicit(spec, "chair")
+        chair.inertia = [1.0, 1.0, 1.0 + 10.0 * size]
+
+
+IMPOSSIBLE = Effect(
+    name="impossible",
+    parameters=(Parameter("size", "1", 1.0, 0.0, 2.0),),
+    signature="none",
+    source="a test",
+    edit=_too_thin,
+)
+
+
+def test_a_candidate_that_cannot_be_is_dropped_and_noted(one_way):
+    _, _, bench, (rolling, _, _) = one_way
+    around = Around(
+        bench=bench, track=rolling.track, variant=Variant(bench.nuisances), pulses=(), answers=()
+    )
+    tried = collect(around, [IMPOSSIBLE, find("sensor_bias", "heading")], lambda key: None)
+    assert {s.effect.name for s in tried.starts} == {"sensor_bias"}
+    assert len(tried.columns) == 1
+    (line,) = tried.dropped
+    assert line.startswith("impossible was not tried: ") and "inertia" in line
+
+
+def test_a_rival_that_cannot_be_is_left_out_of_the_plan_and_noted(one_way):
+    _, _, bench, (rolling, slope, _) = one_way
+    broken = Variant(bench.nuisances, {}, (Term(IMPOSSIBLE, {"size": 1.0}, ()),))
+    rivals = [replace(slope, variant=broken), slope]
+    few = [BY_NAME["coast reversed"]]
+    doubt = replace(IMPOSSIBLE, name="doubted")
+    planned = design.plan(bench, rolling, rivals, few, doubts=[doubt])
+    assert planned.rivals == ("floor_slope",)
+    assert [line.split(" was ")[0] for line in planned.dropped] == ["doubted", "impossible"]
+    with pytest.raises(MjchairError, match="no experiment can be planned"):
+        design.plan(bench, rolling, rivals[:1], few, doubts=())
+
+
+def test_a_fit_that_begins_where_no_chair_is_raises_one_line(one_way):
+    _, _, bench, (rolling, _, _) = one_way
+    broken = Variant(bench.nuisances, {}, (Term(IMPOSSIBLE, {"size": 1.0}, ("size",)),))
+    with pytest.raises(MjchairError, match="does not compile") as error:
+        refit(bench, broken, rolling.track, rounds=1)
+    assert "\n" not in str(error.value)
 
 
 def test_longer_runs_and_less_noise_separate_more(one_way):
@@ -113,7 +168,7 @@ def test_longer_runs_and_less_noise_separate_more(one_way):
     lengths = [replace(BY_NAME["coast reversed"], seconds=s) for s in (2.0, 4.0, 6.0)]
 
     def separations(bench):
-        found = experiments.plan(bench, rolling, [slope], lengths).experiments
+        found = design.plan(bench, rolling, [slope], lengths).experiments
         return [e.least for e in sorted(found, key=lambda e: e.manoeuvre.seconds)]
 
     loud = separations(bench)
@@ -136,20 +191,24 @@ def plan_of(*least):
 
 
 def test_the_words_say_what_to_do_and_what_to_see(one_way):
-    shooter = one_way[2].shooter
-    said = advice.deciding(plan_of(25.0, 1.0), shooter)
+    simulator = one_way[2].simulator
+    said = wording.deciding(plan_of(25.0, 1.0), simulator)
     assert LIBRARY[0].words in said and "about 5 sigmas" in said
     assert "0.2 rad/s lower if it is sensor bias of imu_gyro.z" in said
     assert " Or " not in said and "repeat" not in said
-    assert " Or " in advice.deciding(plan_of(25.0, 24.0), shooter)
-    assert "repeat it 3 times" in advice.deciding(plan_of(3.5), shooter)
-    assert "No manoeuvre of the library decides" in advice.deciding(plan_of(0.0), shooter)
+    assert " Or " in wording.deciding(plan_of(25.0, 24.0), simulator)
+    assert "repeat it 3 times" in wording.deciding(plan_of(3.5), simulator)
+    assert "No manoeuvre of the library decides" in wording.deciding(plan_of(0.0), simulator)
 
 
 @pytest.mark.parametrize(
     ("tied", "word"),
-    [("left wheel's turn", "left wheel"), ("time in coast_0", "exactly"), ("heading", "180")],
+    [
+        (Driver(Quantity.LEFT_TURN), "left wheel"),
+        (Driver(Quantity.TIME, "coast_0"), "exactly"),
+        (Driver(Quantity.HEADING), "180"),
+    ],
 )
 def test_an_unknown_force_is_looked_for_where_it_goes(tied, word):
-    assert word in advice.searching([{"force": "Fx", "goes_with": tied, "sigmas": 9.0}])
-    assert advice.searching([]) == advice.OTHERWISE
+    assert word in wording.searching([(tied, 9.0)])
+    assert wording.searching([]) == wording.OTHERWISE

@@ -167,5 +167,7 @@ def test_bad_numbers_get_one_line(make, line):
 def test_unknown_and_inert_actuators_are_named(model):
     with pytest.raises(MjchairError, match="unknown actuator 'left'; "):
         constant({"left": 1.0}, 1.0).control_array(model, [0.0])
-    with pytest.raises(MjchairError, match="is the state of a tire and takes no input"):
+    with pytest.raises(
+        MjchairError, match="is the state of a tire or of the drive and takes no input"
+    ):
         constant({"left_wheel_tire": 1.0}, 1.0).control_array(model, [0.0])

@@ -15,12 +15,12 @@ SYMMETRIC = ("wheelchair", "caster", "linear", "quadratic", "genta_table1", "whe
 def step(tire, *, u=0.0, w=0.0, r=0.0, fz=200.0, gamma=0.0, vx=0.0, vsx=0.0, vsy=0.0, yaw=0.0, h=H):
     p = tire.block()
     spin = (vx - vsx) / p[block.RADIUS]
-    out = law.step_tire(
-        p, u, w, r, fz, gamma, vx, vsx, vsy, spin, yaw, p[block.RADIUS], 0.0, 1.0, h
+    motion = law.Motion(vx, vsx, vsy, spin, yaw, p[block.RADIUS])
+    new, slip, force = law.step_tire(
+        p, law.Deflection(u, w, r), fz, gamma, motion, law.Road(0.0, 1.0), h
     )
-    return dict(
-        zip(("u", "w", "r", "kappa", "tan_alpha", "fx", "fy", "mx", "my", "mz"), out, strict=True)
-    )
+    told = {"u": new.longitudinal, "w": new.lateral, "r": new.rolling}
+    return told | {"kappa": slip.kappa, "tan_alpha": slip.tan_alpha} | force._asdict()
 
 
 def settle(tire, steps=4000, **given):

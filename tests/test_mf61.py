@@ -1,25 +1,18 @@
 """Magic Formula 5.2 and 6.1: against reference forces, and against the equations unfolded."""
 
 import csv
-import tomllib
 from pathlib import Path
 
 import mf_equations
 import numpy as np
 import pytest
+from mf_equations import BOOK_RADIUS, book
 
 from mjchair.errors import MjchairError
 from mjchair.tire import Tire, law
 from mjchair.tire.formula.mf_names import NAMES_52, NAMES_61, SECTIONS_52
 
 DATA = Path(__file__).parent / "data" / "tire"
-BOOK_RADIUS = 0.313  # m, of the book's 205/60R15; the reference leaves it out
-
-
-def book(**changes):
-    numbers = tomllib.loads((DATA / "mf61_book205.toml").read_text())
-    del numbers["WIDTH"]  # not in the force equations
-    return numbers | {"UNLOADED_RADIUS": BOOK_RADIUS} | changes
 
 
 def tire(family="mf61", **changes):
@@ -191,13 +184,12 @@ def test_a_wheel_that_creeps_at_an_angle_reaches_its_kinematic_slip():
     block = Tire(
         name="t", family="linear", coefficients={"cornering_stiffness": 3600.0, "friction": 0.8}
     ).block()
-    u = w = r = 0.0
+    state = law.Deflection(0.0, 0.0, 0.0)
     slip = np.tan(np.radians(15.0))  # four knees
+    motion = law.Motion(2e-3, 0.0, 2e-3 * slip, 0.0066, 0.0, 0.3)
     for _ in range(4000):
-        u, w, r, _, tan_alpha, *_ = law.step_tire(
-            block, u, w, r, 300.0, 0.0, 2e-3, 0.0, 2e-3 * slip, 0.0066, 0.0, 0.3, 0.0, 1.0, 0.1
-        )
-    assert tan_alpha == pytest.approx(slip, rel=1e-3)
+        state, reached, _ = law.step_tire(block, state, 300.0, 0.0, motion, law.Road(0.0, 1.0), 0.1)
+    assert reached.tan_alpha == pytest.approx(slip, rel=1e-3)
 
 
 def test_plain_python_and_compiled_code_agree():
@@ -207,11 +199,10 @@ def test_plain_python_and_compiled_code_agree():
     for _ in range(50):
         fz, kappa, alpha = rng.uniform(100, 6000), rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5)
         gamma, speed = rng.uniform(-0.1, 0.1), rng.uniform(0.1, 30.0)
-        plain = law.steady_forces(
-            block, fz, kappa, np.tan(alpha), gamma, speed, 1.0, 1.0, wheel.radius, 1.0
-        )
-        fx, fy, mz, mx, my = wheel.forces(fz, kappa, alpha, gamma, speed)
-        assert np.allclose(plain, (fx, fy, mx, my, mz), rtol=1e-12, atol=1e-9)
+        slip = law.Slip(kappa, np.tan(alpha), gamma)
+        plain = law.steady_forces(block, fz, slip, law.Rolling(speed, 1.0, 1.0, wheel.radius), 1.0)
+        given = wheel.forces(fz, kappa, alpha, gamma, speed)
+        assert np.allclose(plain, given, rtol=1e-12, atol=1e-9)
 
 
 def test_a_tir_tire_drives_the_chair_in_the_native_callback():
@@ -238,3 +229,39 @@ def test_a_tir_tire_drives_the_chair_in_the_native_callback():
         assert np.isfinite(data.qpos).all()
         assert data.body("chair").xpos[0] > 0.2
         assert data.sensor("left_wheel_tire").data[0] > 1.0
+
+
+@pytest.mark.parametrize("family", ["mf61", "mf52"])
+def test_a_shift_is_no_slip_where_the_friction_ellipse_limits(family):
+    """Without coefficients of combined slip, pure slip still is the curve of the equations."""
+    none = dict.fromkeys(("RBX1", "RBX3", "RBY1", "RBY4", "RVY1", "RVY2", "RVY3"), 0.0)
+    shifts = {"PHX1": 0.02, "PVX1": 0.05, "PHY1": 0.02, "PVY1": 0.05}
+    numbers = {k: v for k, v in (book() | shifts).items() if family == "mf61" or k in NAMES_52}
+    whole = Tire("book", family, numbers | {"RHX1": 0.0, "RHY1": 0.0}, nominal_load=4000.0)
+    bare = Tire("bare", family, numbers | none, nominal_load=4000.0)
+    alpha, kappa = np.linspace(-0.3, 0.3, 41), np.linspace(-0.5, 0.5, 41)
+    for gamma in (0.0, 0.1):
+        induced = dict.fromkeys(("RVY1", "RVY2", "RVY3"), 0.0)
+        pure = Tire("pure", family, {**whole.coefficients, **induced}, nominal_load=4000.0)
+        given = (4000.0, 0.0, alpha, gamma)
+        np.testing.assert_array_equal(bare.forces(*given).Fy, pure.forces(*given).Fy)
+        given = (4000.0, kappa, 0.0, gamma)
+        np.testing.assert_array_equal(bare.forces(*given).Fx, pure.forces(*given).Fx)
+
+
+def test_magic_formula_52_takes_camber_as_an_angle():
+    """The lateral force of MF 5.2 in pure slip, from its published equations."""
+    c = {k: v for k, v in book().items() if k in NAMES_52} | {"PHY3": 0.03}
+    fz, alpha, gamma = 3500.0, 0.05, 0.08
+    f0 = c["FNOMIN"]
+    df = (fz - f0) / f0
+    mu = (c["PDY1"] + c["PDY2"] * df) * (1 - c["PDY3"] * gamma**2)
+    k = c["PKY1"] * f0 * np.sin(2 * np.arctan(fz / (c["PKY2"] * f0))) * (1 - c["PKY3"] * gamma)
+    y = np.tan(alpha) + c["PHY1"] + c["PHY2"] * df + c["PHY3"] * gamma
+    e = (c["PEY1"] + c["PEY2"] * df) * (1 - (c["PEY3"] + c["PEY4"] * gamma) * np.sign(y))
+    b = k / (c["PCY1"] * mu * fz)
+    sine = np.sin(c["PCY1"] * np.arctan(b * y - e * (b * y - np.arctan(b * y))))
+    v = fz * (c["PVY1"] + c["PVY2"] * df + (c["PVY3"] + c["PVY4"] * df) * gamma)
+    c |= {"PKY4": 2.0, "PKY5": 0.0, "PEY5": 0.0}
+    found = Tire("old", "mf52", c, nominal_load=4000.0).forces(fz, 0.0, alpha, gamma)
+    assert found.Fy == pytest.approx(mu * fz * sine + v, abs=1e-9)

@@ -72,7 +72,8 @@ def test_forward_torque_drives_forward_and_left_turns_right(chair):
 def test_loads_add_up_and_the_rear_axle_carries_its_share(chair):
     data = mujoco.MjData(chair)
     mujoco.mj_step(chair, data, nstep=3000)
-    loads = np.array([data.sensor(f"{wheel}_tire").data[2] for wheel in WHEELS])
+    names = [wheel.name for wheel in wheels(chair)]
+    loads = np.array([data.sensor(f"{name}_tire").data[2] for name in names])
     assert loads.sum() == pytest.approx(9.81 * chair.body_mass.sum(), rel=1e-6)
     assert 0.55 < loads[:2].sum() / loads.sum() < 0.81
 

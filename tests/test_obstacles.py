@@ -114,8 +114,9 @@ def test_the_ground_is_where_mujoco_has_it():
         down = np.array([0.0, 0.0, -1.0])
         ray = mujoco.mj_ray(model, data, place, down, others, 1, -1, which)
         assert which[0] == floor
-        size = (model.hfield_adr[0], 11, 21, model.hfield_size, 0)
-        _, height, _, _ = field.ground_at(model.hfield_data, *size, place[0], place[1])
+        sizes = (model.hfield_adr[0], 11, 21, *model.hfield_size[0, :3])
+        ground = field.HeightField(model.hfield_data, *sizes)
+        _, height, _, _ = field.ground_at(ground, place[0], place[1])
         assert 3.0 - ray == pytest.approx(height + data.geom_xpos[floor, 2], abs=1e-5)
 
 
@@ -398,7 +399,7 @@ def test_heights_survive_saving():
 
 
 def test_bad_grounds_are_named():
-    with pytest.raises(mjchair.MjchairError, match="no height field"):
+    with pytest.raises(mjchair.MjchairError, match="not a height field"):
         mjchair.load_spec(heights=np.zeros((3, 3)))
     with pytest.raises(mjchair.MjchairError, match="shape"):
         mjchair.load_spec(scene="hfield", heights=np.zeros(3))

@@ -1,40 +1,374 @@
-"""The first sentence of a diagnosis' report: what it says for every verdict."""
+"""The report of a diagnosis: what it says, that it escapes, and that every figure can be read."""
 
+from __future__ import annotations
+
+import dataclasses
 import re
 
+import numpy as np
 import pytest
+from figure_layout import assert_legible
 
-from mjchair.diagnosis.verdict import AMBIGUOUS, NAMED, NONE, UNKNOWN, Diagnosis, Named
-from mjchair.report.diagnosis_page import sentence
-
-ROLLING = Named(
-    "rolling_resistance", {"coefficient": {"value": 0.0146, "std": 0.0004, "unit": "1"}}, 0.97
+from mjchair.diagnosis.explain.column_ids import Driver, Quantity
+from mjchair.diagnosis.explain.missing_force import Products, mean_forces
+from mjchair.diagnosis.replay.pulses import Force, Pulse
+from mjchair.diagnosis.result import (
+    Candidate,
+    Diagnosis,
+    Disagreement,
+    Estimate,
+    Evidence,
+    ForceLevels,
+    ForceSamples,
+    GapSummary,
+    MissingForce,
+    Moved,
+    NamedEffect,
+    Nearest,
+    TrialGap,
+    WholeRun,
+    WindowGaps,
 )
-BIAS = Named(
-    "sensor_bias", {"bias": {"value": 0.1, "std": None, "unit": "<m/s>"}}, 0.9, "imu_gyro.z"
+from mjchair.diagnosis.rules import Verdict
+from mjchair.report import diagnosis_words as words
+from mjchair.report.diagnosis_figures import (
+    candidates,
+    gap,
+    missing_force,
+    probability,
+    summary,
+    where,
+    whole_runs,
+)
+from mjchair.report.diagnosis_page import figures, page
+
+ROLLING = NamedEffect(
+    name="rolling_resistance",
+    parameters={"coefficient": Estimate(value=0.0146, std=0.0004, unit="1")},
+    closure=0.97,
+)
+BIAS = NamedEffect(
+    name="sensor_bias",
+    parameters={"bias": Estimate(value=0.1, std=None, unit="<m/s>")},
+    closure=0.9,
+    channel="imu_gyro.z",
+)
+SHOWN = (Quantity.SPEED, Quantity.YAW_RATE, Quantity.HEADING, Quantity.TORQUE)
+CHANNELS = (
+    "left_wheel_speed",
+    "right_wheel_speed",
+    "left_wheel_angle",
+    "right_wheel_angle",
+    "imu_gyro.x",
+    "imu_gyro.y",
+    "imu_gyro.z",
+    "imu_accelerometer.x",
+    "imu_accelerometer.y",
+    "imu_accelerometer.z",
+    "position.x",
+    "position.y",
 )
 
 
-def text(diagnosis: Diagnosis) -> str:
-    return re.sub("<[^>]+>", "", sentence(diagnosis))
-
-
-def test_a_named_effect_comes_with_value_and_uncertainty():
-    assert text(Diagnosis(NAMED, [ROLLING])) == (
-        "The chair lacks rolling resistance (coefficient 0.0146 ± 0.0004)."
+def evidence(trials=3, windows=5, channels=12, largest=250.0, name="trial", corrected=True, seed=0):
+    """Something to draw, of any size."""
+    random = np.random.default_rng(seed)
+    names = CHANNELS[:channels]
+    count = trials * windows
+    starts = np.tile(2.0 * np.arange(windows), trials)
+    before = np.exp(random.uniform(np.log(0.8), np.log(largest), (channels, count)))
+    trial_gaps = tuple(
+        TrialGap(
+            trial=f"{name}_{k}",
+            held_out=k == 0,
+            before=float(np.sqrt((before[:, k * windows : (k + 1) * windows] ** 2).mean())),
+            after=1.1 if corrected else None,
+        )
+        for k in range(trials)
+    )
+    time = np.linspace(0.0, 2.0 * windows, 60 * windows)
+    measured = np.column_stack(
+        [
+            time * (20.0 if "position" in c else 1.0) + 0.01 * random.normal(size=time.size)
+            for c in names
+        ]
+    )
+    drift = 0.05 * time[:, None] * np.ones(channels)
+    run = WholeRun(
+        trial=f"{name}_0",
+        held_out=True,
+        time=time,
+        channels=names,
+        units=("rad/s",) * channels,
+        noise=np.full(channels, 0.01),
+        measured=measured,
+        before=measured + drift,
+        after=measured + 0.1 * drift if corrected else None,
+    )
+    levels = ForceLevels(
+        middle=np.linspace(-1.0, 1.0, 8), value=random.normal(size=8), std=np.full(8, 0.3)
+    )
+    force = {
+        kind: ForceSamples(
+            unit=unit,
+            trials=np.zeros(3, np.int64),
+            time=np.arange(3.0),
+            value=np.ones(3),
+            std=np.ones(3),
+            against={},
+            levels=dict.fromkeys(SHOWN, levels),
+        )
+        for kind, unit in ((Force.FORWARD, "N"), (Force.YAW, "N m"))
+    }
+    return Evidence(
+        windows=WindowGaps(
+            channels=names,
+            trials=np.repeat(np.arange(trials), windows),
+            times=np.column_stack([starts, starts + 2.0]),
+            before=before,
+            after=np.ones_like(before) if corrected else None,
+            highest=2.0,
+        ),
+        trials=trial_gaps,
+        forces=force,
+        runs=(run,),
+        moved=(Moved(name="mass", std=0.05, unit="1", by=0.4),),
     )
 
 
-def test_rivals_are_in_the_sentence():
-    found = Diagnosis(AMBIGUOUS, [ROLLING], [["floor_slope", "rolling_resistance"]])
-    assert "floor slope or rolling resistance" in text(found)
+def diagnosis(verdict=Verdict.NAMED, **options):
+    """A whole diagnosis that nobody made."""
+    named = verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
+    many = [
+        Candidate(
+            name=f"effect_{k}",
+            held_out_gain=1e6 / (k + 1) - 3e5,
+            closure=0.9 / (k + 1),
+            detectability=1300.0 / (k + 1),
+            p_value=0.0,
+            collinear=0.5,
+            channel="imu_accelerometer.x" if k == 3 else None,
+        )
+        for k in range(20)
+    ]
+    return Diagnosis(
+        verdict=verdict,
+        effects=[ROLLING] if named else [],
+        alternatives=[["rolling_resistance", "toe"]] if verdict == Verdict.AMBIGUOUS else [],
+        candidates=many,
+        gap=GapSummary(
+            before=58.96,
+            after=1.1 if named else 9.4,
+            scope="held-out trials: rms of the whitened residual below 2 Hz",
+            p_value=0.0 if verdict != Verdict.NONE else 0.4,
+            p_value_after=0.3,
+        ),
+        where=[
+            Disagreement(
+                trial="trial_0",
+                channel="left_wheel_speed",
+                window=(0.0, 2.0),
+                regime={"speed": "0.5-1.0 m/s"},
+                statistic=250.0**2,
+            )
+        ],
+        next_experiment="Push the chair again. Then coast." if verdict != Verdict.NAMED else "",
+        notes=["No run is held out (`hold_out = true`)", "No run is held out (`hold_out = true`)"],
+        drivers=[MissingForce(force=Force.FORWARD, goes_with=Driver(Quantity.STROKE), sigmas=40.0)],
+        nearest=Nearest(effects=("wind", "toe"), closure=0.94, remainder=9.4)
+        if verdict == Verdict.UNKNOWN
+        else None,
+        evidence=evidence(corrected=named, **options),
+    )
 
 
-@pytest.mark.parametrize("verdict", [NONE, UNKNOWN])
+def test_a_named_effect_comes_with_value_and_uncertainty():
+    said = words.missing(Diagnosis(verdict=Verdict.NAMED, effects=[ROLLING]))
+    assert said == "The chair lacks **rolling resistance** (coefficient 0.01460 ± 0.00040)."
+
+
+def test_rivals_are_in_the_first_sentence():
+    sets = [["floor_slope", "rolling_resistance"]]
+    said = words.missing(Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets))
+    assert "**floor slope** or **rolling resistance**" in said
+
+
+@pytest.mark.parametrize("verdict", [Verdict.NONE, Verdict.UNKNOWN])
 def test_no_name_where_none_is_named(verdict):
-    assert "resistance" not in text(Diagnosis(verdict))
+    assert "resistance" not in words.missing(Diagnosis(verdict=verdict))
 
 
 def test_words_from_outside_are_escaped():
-    said = sentence(Diagnosis(NAMED, [BIAS]))
-    assert "&lt;m/s&gt;" in said and "on imu_gyro.z" in said
+    html = page(Diagnosis(verdict=Verdict.NAMED, effects=[BIAS]), {}, "<i>title</i> & more")
+    assert "&lt;m/s&gt;" in html and "on imu_gyro.z" in html
+    assert "<m/s>" not in html and "<i>" not in html
+    assert "&lt;i&gt;title&lt;/i&gt; &amp; more" in html
+
+
+@pytest.mark.parametrize("verdict", list(Verdict))
+def test_the_first_screen_says_three_things_and_folds_the_rest(verdict):
+    html = page(diagnosis(verdict), {})
+    first, _, rest = html.partition("<details>")
+    assert [re.sub("<.*?>", "", x) for x in re.findall("<dt>.*?</dt>", first)] == [
+        "What is missing",
+        "How sure",
+        "What to do next",
+    ]
+    assert all(len(x) > 20 for x in re.findall("<dd>(.*?)</dd>", first))
+    assert rest.count("<details>") == 7 and rest.count("</details>") == 8
+    assert "`" not in html and "**" not in html
+    assert "e-300" not in html
+    assert html.count("<li>") == len(set(re.findall("<li>.*?</li>", html)))
+
+
+def test_where_nothing_was_corrected_there_is_no_after():
+    html = page(diagnosis(Verdict.UNKNOWN), {})
+    assert "corrected" not in html.replace("corrected chair (model.xml)", "")
+    assert "after" not in re.findall("<summary><h2>6.*?</h2>", html)[0]
+    assert "wind with toe, closes 94% of the gap and leaves 9.4 times the noise" in html
+
+
+def test_the_section_of_the_choice_does_not_contradict_the_notes():
+    html = page(diagnosis(Verdict.UNKNOWN), {})
+    section = html[html.index("4. Which one") : html.index("5. Whole")]
+    assert "94%" in section and html.count("94%") == 1
+    assert "What is only roughly known" in html  # the table of what was moved is there
+
+
+def test_probabilities_have_a_sentence_and_bars():
+    found = diagnosis()
+    assert probability.figure(found) is None
+    found.probability = {"rolling_resistance": 0.97, "outside": 0.02, "none": 0.01}
+    assert words.sure(found).startswith("Probability: 97 % rolling resistance, 2 % something")
+    figure = probability.figure(found)
+    assert [bar.get_width() for bar in figure.axes[0].patches] == pytest.approx([1.0, 2.0, 97.0])
+    assert_legible(figure)
+
+
+def test_a_replay_has_its_place_and_is_shown_as_it_is():
+    assert '<section id="replay"><p>here</p></section>' in page(
+        diagnosis(), {}, replay="<p>here</p>"
+    )
+    assert "replay" not in page(diagnosis(), {})
+
+
+# the figures whose layout hangs on how much there is to draw
+WORST = {
+    "one window of one channel": {"trials": 1, "windows": 1, "channels": 1},
+    "a run of a minute": {"trials": 1, "windows": 30, "channels": 4},
+    "forty trials": {"trials": 40, "windows": 4, "channels": 2},
+    "long names, twelve channels, huge": {
+        "trials": 9,
+        "name": "coast_east_on_the_old_linoleum_floor_of_the_laboratory",
+        "largest": 1e5,
+    },
+}
+
+
+@pytest.mark.parametrize("case", list(WORST))
+def test_figures_of_much_and_of_little_can_be_read(case):
+    found = diagnosis(Verdict.UNKNOWN, **WORST[case])
+    for module in (where, gap):
+        assert_legible(module.figure(found))
+
+
+@pytest.mark.parametrize(
+    "module", [where, missing_force, candidates, whole_runs, gap, summary], ids=lambda m: m.__name__
+)
+def test_every_figure_of_a_correction_can_be_read(module):
+    assert_legible(module.figure(diagnosis(largest=1.5)))
+
+
+def test_a_large_gap_does_not_make_one_solid_bar():
+    """Data at 40 to 250 times the noise have as many colours as windows."""
+    found = diagnosis(largest=250.0)
+    mesh = where.figure(found).axes[0].collections[0]
+    drawn = np.unique(np.round(mesh.to_rgba(mesh.get_array()).reshape(-1, 4), 3), axis=0)
+    assert len(drawn) > 0.8 * mesh.get_array().size
+
+
+def test_time_stands_below_the_map():
+    found = diagnosis(Verdict.UNKNOWN, trials=2, windows=5)
+    axes = where.figure(found).axes[0]
+    labels = {t.get_text(): t.get_position()[0] for t in axes.get_xticklabels()}
+    assert labels["0"] >= 0.0 and len(labels) >= 3
+    begins = [m.get_coordinates()[0, 0, 0] for m in axes.collections]
+    assert begins == [0.0, 10.0]  # s: the second trial follows the first
+
+
+def test_a_channel_is_drawn_once():
+    run = evidence(channels=1).runs[0]
+    assert whole_runs.telling(run, 2) == [0]
+    both = evidence(channels=2).runs[0]
+    assert whole_runs.telling(both, 2) in ([0], [1])  # left and right of one kind
+
+
+def test_places_are_drawn_as_differences_and_after_speeds():
+    run = evidence().runs[0]
+    shown = [run.channels[k] for k in whole_runs.telling(run, 9)]
+    assert shown.index("position.x") > shown.index("imu_gyro.x")
+    alone = dataclasses.replace(
+        run,
+        channels=("position.x",),
+        units=("m",),
+        noise=run.noise[10:11],
+        measured=run.measured[:, 10:11],
+        before=run.before[:, 10:11],
+        after=run.after[:, 10:11],
+    )
+    found = diagnosis()
+    found.evidence = dataclasses.replace(found.evidence, runs=(alone,))
+    (axes,) = whole_runs.figure(found).axes
+    assert "simulated less measured" in axes.get_ylabel()
+    lines = {line.get_label(): np.asarray(line.get_ydata()) for line in axes.lines}
+    np.testing.assert_allclose(lines["chair as it was"], 0.05 * alone.time, atol=1e-9)
+
+
+def test_figures_without_anything_to_show_are_left_out():
+    assert figures(Diagnosis(verdict=Verdict.NONE)) == {}
+
+
+def test_figures_are_pictures():
+    drawn = figures(diagnosis(trials=1, windows=1, channels=1))
+    assert set(drawn) == {"summary", "where", "force", "candidates", "compared", "gap"}
+    assert all(image.startswith(b"\x89PNG") for image in drawn.values())
+
+
+def test_without_a_turn_measured_nothing_is_said_of_turning():
+    found = diagnosis(Verdict.UNKNOWN)
+    cell = dataclasses.replace(found.where[0], regime={"speed": "1 m/s", "yaw_rate": "2 rad/s"})
+    found.where, yaw = (
+        [cell],
+        MissingForce(force=Force.YAW, goes_with=Driver(Quantity.YAW_RATE), sigmas=9.0),
+    )
+    found.drivers = [*found.drivers, yaw]
+    assert "yaw rate" in page(found, {}) and len(missing_force.figure(found).axes) == 8
+    found.evidence = dataclasses.replace(found.evidence, turns=False)
+    html = page(found, {})
+    assert "yaw" not in html and "stroke" in html
+    figure = missing_force.figure(found)
+    assert [a.get_xlabel() for a in figure.axes if a.axison] == [
+        "speed (m/s)",
+        "torque, both wheels (N m)",
+    ]
+
+
+def test_mean_forces_are_not_drawn_towards_zero():
+    """A truth of 3.8 N comes back where the smoothed force, with its prior, says far less."""
+    pulses = [
+        Pulse(window=w, force=Force.FORWARD, time=0.2 * k, width=0.2)
+        for w in range(3)
+        for k in range(6)
+    ]
+    level = np.array([k % 2 for _ in range(3) for k in range(6)])
+    truth = np.array([3.8, -1.0])
+    random = np.random.default_rng(0)
+    products = []
+    for w in range(3):
+        J = 0.01 * random.normal(size=(20, 6))  # little is told: the prior of 10 N would win
+        G = J.T @ J
+        mine = list(range(6 * w, 6 * w + 6))
+        products.append(Products(mine, G, G @ truth[level[mine]]))
+    value, std = mean_forces(products, pulses, Force.FORWARD, level)
+    np.testing.assert_allclose(value, truth, rtol=1e-3)
+    assert (std > 1.0).all()

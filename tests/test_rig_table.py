@@ -42,7 +42,7 @@ def test_what_is_written_reads(tmp_path):
         ("slip_angle_deg,load_n\n1,2\n", "no lateral force"),
         ("slip_angle_deg,load_n,fy_n\n", "no runs"),
         ("slip_angle_deg,load_n,fy_n\n1,2\n", "row 2 has 2 cells"),
-        ("slip_angle_deg,load_n,fy_n\n1,2,much\n", "fy_n in row 2 is 'much'"),
+        ("slip_angle_deg,load_n,fy_n\n1,2,much\n", "row 2, column 'fy_n': 'much' is not a number"),
         ("slip_angle_deg,load_n,fy_n\n1,2,inf\n", "must be finite"),
         ("slip_angle_deg,load_n,fy_n\n1,,3\n", "load_n in row 2 is empty"),
         ("slip_angle_deg,load_n,fy_n\n1,-2,3\n", "load_n in row 2 is -2"),

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 import mjchair
-from mjchair.diagnosis import begin, noise
+from mjchair.diagnosis.data import first_state
+from mjchair.diagnosis.replay import noise
 from mjchair.errors import MjchairError
 from mjchair.measurement import samples
 
@@ -220,7 +221,7 @@ def test_places_tell_the_first_heading(sign, turn, tmp_path):
         "position.x": x + 0.01 * rng.standard_normal(TIME.size),
         "position.y": y + 0.01 * rng.standard_normal(TIME.size),
     }
-    found = begin.initial(mjchair.read_study(write(tmp_path, columns)).runs[0])
+    found = _first(mjchair.read_study(write(tmp_path, columns)))
     assert found.heading == pytest.approx(2.5, abs=0.06)
     assert found.speed == pytest.approx(sign, abs=0.02)
 
@@ -250,3 +251,25 @@ def test_a_clock_that_jumps_is_refused(tmp_path):
 
 def test_unknown_keys_are_named(tmp_path):
     fails(write(tmp_path, wheels(), "hold_ot = true\n"), "did you mean 'hold_out'")
+
+
+def _first(study):
+    return first_state.initial(study.runs[0], study.axle)
+
+
+def test_a_measured_torque_lags_behind_no_motor(tmp_path):
+    """Lag and braking of a motor are tried where torques are commands, and else are not."""
+    from mjchair.diagnosis.diagnose import study_effects
+
+    torque = {"left_wheel": np.sin(TIME), "right_wheel": np.sin(TIME)}
+    motors = {"drive_lag", "back_emf"}
+
+    def tried(head):
+        study = mjchair.read_study(write(tmp_path, wheels() | torque, head=head))
+        return motors & {effect.name for effect in study_effects(study)}
+
+    assert tried('model = "manual"\n') == motors
+    assert tried('model = "manual"\ntorque = "measured"\n') == set()
+    smartwheel = mjchair.read_study(samples.folder() / "smartwheel")
+    assert not motors & {effect.name for effect in study_effects(smartwheel)}
+    fails(write(tmp_path, wheels(), head='torque = "mesured"\n'), "did you mean 'measured'")

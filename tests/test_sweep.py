@@ -14,8 +14,9 @@ import pytest
 
 import mjchair
 from mjchair import sweep
+from mjchair.model import assets
 from mjchair.model.parameters import ChairParameters
-from mjchair.sweep import chunk, measures
+from mjchair.sweep import chunk, fingerprint, measures
 
 SMALL = sweep.Study(
     axes={"axle_position": [0.0, 0.05], "tire_pressure": [0.5, 1.0], "seed": [0, 1]},
@@ -134,10 +135,17 @@ def test_scenes_of_different_sizes_share_a_study():
         ("axes = {camber = []}\nduration = 1.0", "no list of values"),
         ("axes = {camber = [9.0]}\nduration = 1.0", "camber is 9 rad"),
         ("axes = {camber = [0.1]}\nduration = -1.0", "duration is -1 s"),
-        ("axes = {camber = [0.1]}", "has a duration"),
-        ("axes = {camber = [0.1", "no TOML"),
+        ("axes = {camber = [0.1]}", "has no 'duration'"),
+        ("axes = {camber = [0.1", "not TOML"),
         ('axes = {"toe.wrong" = [0.1]}\nduration = 1.0', "no parameter"),
-        ("axes = {speed = [0.1]}\nduration = 1.0\nspeeed = 3", "unknown entry"),
+        ("axes = {speed = [0.1]}\nduration = 1.0\nspeeed = 3", "unknown key 'speeed'"),
+        ('axes = {grade = ["8%"]}\nduration = 1.0', "must be a number, such as 0.08"),
+        ("axes = {speed = [true]}\nduration = 1.0", "speed is True; it must be a number"),
+        ("axes = {model = [3]}\nduration = 1.0", "must be a name or a path"),
+        ("axes = {speed = 3}\nduration = 1.0", "no list of values"),
+        ('axes = {speed = [0.1]}\nduration = "1 s"', "duration is '1 s'"),
+        ('axes = {speed = [0.1]}\nduration = 1.0\nchunk = "x"', "chunk is 'x'"),
+        ("axes = {speed = [0.1]}\nduration = 1.0\nfixed = 3", "fixed is 3"),
     ],
 )
 def test_bad_studies_get_one_line(study, message, tmp_path, capsys):
@@ -198,7 +206,7 @@ def test_a_killed_worker_loses_nothing(tmp_path):
         try:
             with distributed.Client(address, set_as_default=False) as client:
                 client.wait_for_workers(2, timeout=60)
-                killed = killer(client, workers[0])
+                killed = killer(client, "one", workers[0])
                 table = sweep.run(study, tmp_path / "out", scheduler=address)
                 assert killed.wait(), "no worker was killed: the test shows nothing"
         finally:
@@ -208,16 +216,18 @@ def test_a_killed_worker_loses_nothing(tmp_path):
     assert rows(table) == expected, "a cluster's results are this machine's, to the bit"
 
 
-def killer(client, process):
-    """Kill the worker process as soon as it computes."""
+def killer(client, name, process):
+    """Kill the process of the worker of that name as soon as it has something to compute."""
     import threading
 
     done = threading.Event()
 
+    known = client.scheduler_info()["workers"]
+    address = next(place for place, told in known.items() if told["name"] == name)
+
     def watch():
         for _ in range(6000):
-            busy = client.processing()
-            if all(busy.values()) and len(busy) == 2:
+            if client.processing().get(address):
                 time.sleep(0.05)
                 os.kill(process.pid, signal.SIGKILL)
                 done.set()
@@ -235,7 +245,7 @@ def killer(client, process):
 
 
 def test_a_slim_model_is_the_same_chair():
-    from mjchair.model.looks import without_looks
+    from mjchair.model.visual_geoms import without_looks
 
     spec = mjchair.load_spec()
     states = []
@@ -252,5 +262,105 @@ def test_the_study_file_says_what_it_is(tmp_path):
     study = sweep.Study(axes={"speed": [0.5]}, duration=0.05)
     sweep.run(study, tmp_path / "out")
     told = json.loads(Path(tmp_path / "out/study.json").read_text())
-    assert told["cases"] == 1 and told["digest"] == study.digest()
-    assert study.digest() != sweep.Study(axes={"speed": [0.6]}, duration=0.05).digest()
+    assert told["cases"] == 1 and told["fingerprint"] == study.fingerprint()
+    other = sweep.Study(axes={"speed": [0.6]}, duration=0.05).fingerprint()
+    assert [k for k in other if other[k] != told["fingerprint"][k]] == [next(iter(other))]
+
+
+def chair_file(folder):
+    """The manual chair in two files, one included by the other, with a tire file of its own."""
+    folder.mkdir(exist_ok=True)
+    text = (assets.folder() / "manual/manual.xml").read_text()
+    (folder / "part.xml").write_text(text)
+    (folder / "chair.xml").write_text('<mujoco model="mine"><include file="part.xml"/></mujoco>')
+    (folder / "my.toml").write_text((assets.folder() / "tires/wheelchair.toml").read_text())
+    return folder
+
+
+def edit(path, before, after):
+    text = path.read_text()
+    assert before in text
+    path.write_text(text.replace(before, after))
+
+
+def test_changed_files_are_not_answered_with_old_results(tmp_path):
+    """The chair, what it includes, and its tire, changed behind unchanged names."""
+    mine = chair_file(tmp_path / "mine")
+    study = sweep.Study(
+        axes={"speed": [1.0]},
+        duration=0.2,
+        fixed={"model": str(mine / "chair.xml"), "tire": str(mine / "my.toml")},
+    )
+    out = tmp_path / "out"
+    first = rows(sweep.run(study, out))
+    assert rows(sweep.run(study, out)) == first
+    edits = [
+        (mine / "my.toml", "rolling_resistance = 0.0", "rolling_resistance = 0.1"),
+        (mine / "part.xml", 'mass="85"', 'mass="120"'),
+    ]
+    for path, before, after in edits:
+        with pytest.raises(mjchair.MjchairError, match="changed: models, scenes or tires"):
+            edit(path, before, after)
+            sweep.run(study, out)
+        changed = rows(sweep.run(study, out, force=True))
+        assert changed[0]["end_x"] != first[0]["end_x"], "in this process as well, no cache answers"
+        first = changed
+
+
+FACTOR = 2.0
+
+
+def helper(value):
+    return FACTOR * value
+
+
+def measure(power):
+    def weighed(sensed):
+        return {"x": helper(sensed.channels["position.x"][-1]) ** power}
+
+    return weighed
+
+
+def test_a_changed_measure_is_another_study(monkeypatch):
+    """Its bytecode, what it closes over, what it calls and the values that it reads."""
+    base = fingerprint.of_function(measure(1))
+    assert base == fingerprint.of_function(measure(1))
+    assert base != fingerprint.of_function(measure(2)), "its closure"
+    monkeypatch.setattr(sys.modules[__name__], "FACTOR", 3.0)
+    assert base != fingerprint.of_function(measure(1)), "a value that a function it calls reads"
+    monkeypatch.undo()
+    monkeypatch.setattr(sys.modules[__name__], "helper", lambda value: value + 1.0)
+    assert base != fingerprint.of_function(measure(1)), "a function that it calls"
+    monkeypatch.undo()
+    assert base == fingerprint.of_function(measure(1))
+    texts = [
+        "def f(s): return {'x': 1.0}",
+        "def f(s): return {'x': 2.0}",
+        "def f(s):\n return {'x': 1.0}",
+    ]
+    made = []
+    for text in texts:
+        names = {"__name__": "__main__"}
+        exec(text, names)
+        made.append(fingerprint.of_function(names["f"]))
+    assert made[0] != made[1] and made[0] == made[2], "its lines of text do not matter"
+
+
+def test_a_fingerprint_is_the_same_in_every_process():
+    code = (
+        "from mjchair.sweep import fingerprint\n"
+        "NAMES = {'a', 'b', 'c', 'd'}\n"
+        "def f(s, k={'x', 'y', 'z'}): return {n: 1.0 for n in NAMES if n in {'a', 'b', 'q'}}\n"
+        "print(fingerprint.of_function(f))"
+    )
+    told = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2")
+    }
+    assert len(told) == 1

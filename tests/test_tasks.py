@@ -1,12 +1,20 @@
 """The tasks: conformance, the suite's own checks, determinism, and baselines that solve them."""
 
+import mujoco
 import numpy as np
 import pytest
 from absl.testing import absltest
+from conftest import has_graphics
 from dm_env import test_utils
 
 import mjchair
-from mjchair import tasks  # chooses the OpenGL that dm_control takes
+from mjchair import tasks
+from mjchair.model.mass_distribution import mass_distribution
+from mjchair.simulation.standing import Fall, fall_of_run
+from mjchair.tasks import ramp_hold
+from mjchair.tasks.baselines import Drive
+
+drawn = pytest.mark.skipif(not has_graphics(), reason="no offscreen OpenGL on this machine")
 
 FLAT = "observations"  # what dm_control calls them where they are flat
 
@@ -136,9 +144,10 @@ def test_no_observation_is_constant(name):
     seen = [step.observation for _ in range(2) for step in play(environment, actions)]
     for key in seen[0]:
         values = np.array([observation[key] for observation in seen])
-        if (name, key) in {("tight_turn", "walls"), ("slalom", "side")}:
+        task = name.removeprefix("power_")
+        if (task, key) in {("tight_turn", "walls"), ("doorway", "walls"), ("slalom", "side")}:
             values = values[:, :1]  # no wall within reach of some feelers; no post passed
-        if (name, key) != ("slalom", "side"):
+        if (task, key) != ("slalom", "side"):
             assert (values != values[0]).any(axis=0).all(), key
 
 
@@ -173,10 +182,15 @@ def test_random_torques_do_not_solve_it(name):
 
 def test_gymnasium_takes_it(name):
     pytest.importorskip("gymnasium", reason="the extra [tasks] is not installed")
-    shimmy = pytest.importorskip("shimmy", reason="the extra [tasks] is not installed")
+    pytest.importorskip("shimmy", reason="the extra [tasks] is not installed")
+    import gymnasium
     from gymnasium.utils.env_checker import check_env
 
-    check_env(shimmy.DmControlCompatibilityV0(load(name)), skip_render_check=True)
+    environment = gymnasium.make(f"mjchair/{name}-v0")
+    check_env(environment.unwrapped, skip_render_check=True)
+    seen, _ = environment.reset(seed=5)
+    same = load(name, seed=5).reset().observation
+    assert all(np.array_equal(seen[key], same[key]) for key in same)
 
 
 def test_observations_are_described(name):
@@ -211,6 +225,64 @@ def test_touching_a_post_ends_the_episode():
     assert environment.physics.touches()
 
 
+def still(environment):
+    """Let a loaded environment go without torques; the time at which its episode ends, s."""
+    for _ in range(150):
+        if environment.step(np.zeros(2)).last():
+            break
+    return environment.physics.time()
+
+
+def lean(environment, angle):
+    """Turn the chair about its own x axis, 2 m above the floor, where nothing touches it."""
+    data = environment.physics.data
+    turn, moved = np.array([np.cos(0.5 * angle), np.sin(0.5 * angle), 0.0, 0.0]), np.zeros(4)
+    mujoco.mju_mulQuat(moved, data.qpos[3:7], turn)
+    data.qpos[3:7] = moved
+    data.qpos[2] += 2.0
+
+
+@pytest.mark.parametrize(("angle", "end"), [(0.5, 0.5), (0.7, 0.5), (0.87, 0.02)])
+def test_an_episode_ends_by_the_rule_of_a_recording(angle, end):
+    """In the air for 0.5 s, or more than 45 deg from the floor's normal; not at 40 deg."""
+    environment = load("straight_line")
+    environment.reset()
+    lean(environment, angle)
+    assert still(environment) == pytest.approx(end, abs=0.021)
+    assert environment.task.fall is (Fall.TIPPED if angle > 0.785 else Fall.OFF_GROUND)
+    environment.reset()
+    assert environment.task.fall is None
+
+
+def test_an_episode_and_a_recording_agree_on_a_fall():
+    """A chair thrown over sideways: the fall of the run, by the recording's own function."""
+    environment = load("straight_line")
+    environment.reset()
+    physics = environment.physics
+    physics.data.qvel[3] = 4.5  # rad/s, about the chair's x axis
+    samples = []
+    for _ in range(150):
+        step = environment.step(np.zeros(2))
+        samples.append((physics.time(), physics.data.qpos.copy(), physics.data.sensordata.copy()))
+        if step.last():
+            break
+    assert step.discount == 0.0
+    time, qpos, sensed = (np.array(column) for column in zip(*samples, strict=True))
+    fallen = fall_of_run(physics.model.ptr, time, qpos, sensed)
+    assert fallen.kind is environment.task.fall
+    assert fall_of_run(physics.model.ptr, time[:-1], qpos[:-1], sensed[:-1]) is None
+
+
+def test_a_drive_has_the_numbers_of_its_chair():
+    manual, power = (Drive.of(mjchair.load_spec(m).compile()) for m in ("manual", "power"))
+    assert (manual.radius, manual.track, manual.arm) == pytest.approx((0.3, 0.56, 0.12), abs=1e-4)
+    assert power.radius == pytest.approx(0.17)
+    parts = mass_distribution(mjchair.load_spec().compile())
+    assert (parts.mass, parts.ahead, parts.yaw_inertia) == pytest.approx(
+        (90.0, 0.12, 5.63), abs=0.01
+    )
+
+
 def test_hands_rest_between_strokes():
     environment = load("push")
     environment.reset()
@@ -242,6 +314,41 @@ def test_a_controller_that_knows_the_lateral_force_is_better():
     assert errors[True] < 0.6 * errors[False]
 
 
+@drawn
+def test_a_picture_shows_what_to_do(name):
+    """Of goal, path, walls or posts, a part of the first picture (by segmentation)."""
+    environment = tasks.load(name, {"random": 0})
+    environment.reset()
+    physics = environment.physics
+    seen = {"goal", "line", "mark", "wall", "post"}
+    picture = physics.render(120, 160, camera_id="follow", segmentation=True)
+    kinds = picture[..., 0][picture[..., 1] == int(mujoco.mjtObj.mjOBJ_GEOM)]
+    names = {physics.model.id2name(int(i), "geom").partition("_")[0] for i in set(kinds)}
+    assert names & seen, names
+
+
+def test_the_goal_in_the_picture_is_that_of_the_task():
+    def plate(physics):
+        return physics.named.data.mocap_pos["goal"]
+
+    environment = load("ramp_hold", looks=True)
+    environment.reset()
+    for moment in (0.0, 9.5):
+        environment.physics.data.time = moment
+        environment.task.show_goal(environment.physics)
+        x, _, z = plate(environment.physics)
+        here = environment.physics.position()[0]
+        to_go = (x - here) * np.hypot(1.0, ramp_hold.GRADE)
+        assert to_go == pytest.approx(environment.task.to_go(environment.physics))
+        assert z - x * ramp_hold.GRADE == pytest.approx(0.003)
+    environment = load("push", looks=True)
+    environment.reset()
+    for _ in range(50):
+        environment.step(np.zeros(2))
+    assert plate(environment.physics)[0] == pytest.approx(environment.task.target * 1.0, rel=0.05)
+
+
+@drawn
 def test_pixels_on_request():
     environment = tasks.load(
         "straight_line", {"random": 0}, pixels={"height": 48, "width": 64, "camera_id": "follow"}
@@ -250,6 +357,24 @@ def test_pixels_on_request():
     assert picture.shape == (48, 64, 3) and picture.std() > 5.0
     with pytest.raises(mjchair.MjchairError, match="need looks"):
         tasks.load("straight_line", looks=False, pixels=True)
+
+
+@drawn
+def test_a_small_picture_costs_no_large_buffer():
+    """Every size has a buffer, a shadow map and a sampling of its own, in whatever order."""
+    physics = tasks.load("straight_line", {"random": 0}).physics
+    before = physics.model.vis.quality.shadowsize, physics.model.vis.global_.offwidth
+    alone = physics.render(84, 84, camera_id="follow")
+    large = physics.render(height=300, width=400, camera_id="follow")
+    assert large.shape == (300, 400, 3)
+    assert np.array_equal(physics.render(84, 84, camera_id="follow"), alone)
+    small = physics._sized[84, 84].mujoco.ptr
+    assert (small.offWidth, small.offHeight, small.offSamples) == (84, 84, 0)
+    assert small.shadowSize == 512 and physics._sized[300, 400].mujoco.ptr.offSamples > 0
+    assert (physics.model.vis.quality.shadowsize, physics.model.vis.global_.offwidth) == before
+    averaged = large.reshape(300, 400, 3).mean(axis=(0, 1))
+    assert averaged == pytest.approx(alone.mean(axis=(0, 1)), abs=25.0), "the same scene"
+    physics.free()
 
 
 def test_an_unknown_task_is_named():
@@ -265,3 +390,24 @@ def test_a_path_of_ones_own():
     assert environment.task.course.at(1.0)[0] == pytest.approx((1.0, 0.0), abs=0.03)
     with pytest.raises(mjchair.MjchairError, match="a path has shape"):
         tasks.load("follow_path", {"path": [(0, 0), (1, 0)]}, looks=False)
+
+
+def test_a_recorded_episode_is_the_episode():
+    """The same rewards and places as stepping it by hand, with every sensor of the chair."""
+    steps, places, rewards = 0, [], []
+    environment, controller = load("tight_turn", looks=True), tasks.baseline("tight_turn")
+    step = environment.reset()
+    while not step.last():
+        places.append(environment.physics.data.qpos.copy())
+        step = environment.step(controller(step.observation))
+        rewards.append(step.reward)
+        steps += 1
+    places.append(environment.physics.data.qpos.copy())
+    episode = tasks.record(load("tight_turn", looks=True), tasks.baseline("tight_turn"))
+    np.testing.assert_array_equal(episode.qpos, places)
+    np.testing.assert_array_equal(episode["reward"][1:], rewards)
+    assert episode.time.size == steps + 1
+    load_on_wheels = sum(episode[f"{wheel}_tire.Fz"] for wheel in episode.wheels)
+    weight = 9.81 * environment.physics.model.body_subtreemass[0]
+    assert np.median(load_on_wheels) == pytest.approx(weight, rel=0.03)
+    assert episode.replay().html.count("left_wheel_tire.Fy") >= 1

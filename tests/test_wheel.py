@@ -63,6 +63,8 @@ def test_it_carries_models_tires_data_and_licence(built):
         "mjchair/models/tires/wheelchair.toml",
         "mjchair/data/smartwheel/propulsion.csv",
         "mjchair/data/smartwheel/NOTICE.txt",
+        "mjchair/report/templates/diagnosis.html",
+        "mjchair/report/templates/diagnosis.css",
         "mjchair/data/smartwheel/LICENSE.txt",
     ):
         assert wanted in names

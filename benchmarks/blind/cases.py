@@ -1,4 +1,4 @@
-"""The cases of the benchmark: every effect at three sizes, pairs, none, and outside the library."""
+"""The cases: every effect in three sizes, pairs, no effect, and effects outside the library."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ EFFECTS = (
     "rolling_resistance", "bearing_friction", "air_drag", "wind", "floor_slope", "toe", "camber",
     "mass_offset", "payload", "wheel_radius", "cornering_stiffness", "load_sensitivity",
     "tire_friction", "relaxation_length", "turning_scrub", "caster_friction", "caster_trail",
-    "torque_gain", "drive_lag", "back_emf", "rider_sway", "surface_patch", "sensor_bias",
+    "torque_gain", "drive_lag", "back_emf", "rider_motion", "surface_patch", "sensor_bias",
     "sensor_scale", "sensor_delay",
 )  # fmt: skip
 
@@ -41,7 +41,7 @@ def parameters(name: str, rng: np.random.Generator) -> dict[str, float]:
         "torque_gain": {"left": 0.1 * sign},
         "drive_lag": {"time_constant": 0.08},
         "back_emf": {"coefficient": 0.1},
-        "rider_sway": {"mass": 40.0, "amplitude": 0.02, "frequency": float(rng.uniform(0.7, 1.3)),
+        "rider_motion": {"mass": 40.0, "amplitude": 0.02, "frequency": float(rng.uniform(0.7, 1.3)),
                        "phase": way},
         "surface_patch": {"x": float(rng.uniform(2.0, 4.0)), "y": 0.1, "radius": 0.7,
                           "coefficient": 0.03},
@@ -80,5 +80,28 @@ def case(number: int, seed: int) -> Case:
     nth = turn * len(ones) + ones.index(place)
     name = EFFECTS[order[nth % len(EFFECTS)]]
     sigma = (50.0, 15.0, 5.0)[(nth // len(EFFECTS)) % 3]
+    channel = str(rng.choice(SENSOR_CHANNELS)) if name.startswith("sensor") else ""
+    return Case("one", {name: parameters(name, rng)}, sigma, channel)
+
+
+def planar_case(number: int, seed: int) -> Case:
+    """Case `number` of the planar generator: of every 20, 8 hide nothing, 10 one effect, 2 others.
+
+    In every case the chair differs slightly from the model.
+    """
+    import planar
+
+    rng = np.random.default_rng([seed, number, 8])
+    turn, place = divmod(number, 20)
+    if place % 5 in (0, 3):
+        return Case("none")
+    if place in (9, 19):
+        which = planar.OUTSIDE[(turn + place) % len(planar.OUTSIDE)]
+        return Case("outside", {which: parameters(which, rng)}, 40.0)
+    ones = [k for k in range(20) if k % 5 not in (0, 3) and k not in (9, 19)]
+    nth = turn * len(ones) + ones.index(place)
+    order = np.random.default_rng([seed, 12]).permutation(len(planar.EFFECTS))
+    name = planar.EFFECTS[order[nth % len(planar.EFFECTS)]]
+    sigma = (40.0, 15.0)[(nth // len(planar.EFFECTS)) % 2]
     channel = str(rng.choice(SENSOR_CHANNELS)) if name.startswith("sensor") else ""
     return Case("one", {name: parameters(name, rng)}, sigma, channel)

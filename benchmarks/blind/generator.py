@@ -1,9 +1,10 @@
-"""Studies with an effect hidden in them, made by means that the diagnosis does not know.
+"""Studies with a hidden effect, made by code that is independent of the diagnosis.
 
-Shares no effect code with the library: what is hidden here is an edit of the compiled MjModel, or
-a force that this file computes and applies in its own loop of mj_step, at half the step of the
-diagnosis and with another integrator. Masses, stiffnesses and sensors are off by a few percent,
-the samples are noisy, rounded, and now and then missing. The answer goes into a sealed file.
+This file shares no effect code with the library. A hidden effect is an edit of the compiled
+MjModel, or a force that this file computes and applies in its own loop of mj_step, with half the
+time step of the diagnosis and another integrator. Masses, stiffnesses and sensors have errors of a
+few percent; the samples are noisy, rounded, and sometimes missing. The answer goes into a sealed
+file.
 """
 
 from __future__ import annotations
@@ -89,9 +90,10 @@ MANOEUVRES = (
 
 @dataclass
 class Case:
-    """What is hidden: kind is none, one, two or outside; hidden maps names to parameters.
+    """A hidden answer: kind is none, one, two or outside; hidden maps names to parameters.
 
-    sigma is what each is to show at, reached what it shows at (beside what is roughly known).
+    sigma: intended detectability of each effect. reached: the one that it has, after the fit of the
+    roughly known numbers.
     """
 
     kind: str
@@ -107,7 +109,7 @@ class World:
     def __init__(
         self, rng: np.random.Generator | None, hidden: dict[str, dict[str, float]]
     ) -> None:
-        """Perturb what is roughly known (None: not at all), then hide the effects."""
+        """Perturb the roughly known numbers (None: no perturbation), then hide the effects."""
         self.hidden = hidden
         self.forces = [n for n in hidden if hasattr(self, f"_force_{n}")]
         spec = mjchair.load_spec()
@@ -143,7 +145,7 @@ class World:
             self.m.geom_user[self.tire[w], COEFFICIENTS + 3] *= factor  # a3 of PAC89
 
     def change(self, name: str, by: float) -> None:
-        """Change one of what is ROUGHLY known."""
+        """Change one of the ROUGHLY known numbers."""
         m, c = self.m, self.chair
         if name == "mass":
             m.body_mass[c] *= 1.0 + by
@@ -268,7 +270,7 @@ class World:
             for w in WHEELS[:2]:
                 d.qfrc_applied[self.dof[w]] -= p["coefficient"] * d.qvel[self.dof[w]]
 
-    def _force_rider_sway(self, d, p, r, v, speed, yaw, driven, total):
+    def _force_rider_motion(self, d, p, r, v, speed, yaw, driven, total):
         w = 2 * np.pi * p["frequency"]
         place = p["amplitude"] * np.sin(w * d.time + p["phase"])
         force = p["mass"] * w**2 * place
@@ -313,7 +315,7 @@ COEFFICIENTS = 23  # where the coefficients a0, a1, ... of PAC89 begin in geom_u
 
 
 def run(world: World, man: Manoeuvre, seconds: float) -> tuple[dict, np.ndarray]:
-    """One run: exact channels at RATE, and the torques that the table will tell."""
+    """One run: exact channels at RATE, and the torques for the table."""
     m = world.m
     every = round(1.0 / (RATE * STEP))
     sensors = {n: int(m.sensor(n.partition(".")[0]).adr[0]) for n in NOISE}
@@ -340,7 +342,7 @@ def run(world: World, man: Manoeuvre, seconds: float) -> tuple[dict, np.ndarray]
 
 
 def sense(rng: np.random.Generator, case: Case, exact: dict, told: np.ndarray) -> dict:
-    """Faults of sensors, noise, rounding, missing samples."""
+    """Add sensor faults, noise, rounding and missing samples."""
     table = {"time": told[:, 0]}
     for name, (std, step) in NOISE.items():
         values = exact[name].copy()
@@ -408,7 +410,7 @@ def _write(path: Path, table: dict[str, np.ndarray]) -> None:
 
 
 def seal(path: Path, case: Case) -> None:
-    """Hide the answer from a casual look."""
+    """Store the answer in a form that cannot be read by accident."""
     text = json.dumps(
         {
             "kind": case.kind,
@@ -439,10 +441,10 @@ LINEAR = {  # channel -> order of the polynomial that a free initial state takes
 
 
 def apart(with_it: list[dict], without: list[dict], afresh: bool = True) -> np.ndarray:
-    """What two sets of exact runs differ by, over the noise, (n,).
+    """Differences between two sets of exact runs, over the noise, (n,).
 
     Args:
-      afresh: each 2 s may start from another place and speed.
+      afresh: every interval of 2 s may start from another position and speed.
     """
     out = []
     for a, b in zip(with_it, without, strict=True):
@@ -477,7 +479,7 @@ ROUGHLY = {  # what a study knows only roughly: standard deviations, as the docu
 
 @lru_cache
 def roughly(trial: int, seconds: float) -> np.ndarray:
-    """What one standard deviation of each roughly known number changes in a run, (n, numbers)."""
+    """Change of a run by one standard deviation of each roughly known number, (n, numbers)."""
     man = MANOEUVRES[trial]
     plain = run(World(None, {}), man, seconds)[0]
     columns = []
@@ -494,16 +496,16 @@ def roughly(trial: int, seconds: float) -> np.ndarray:
 
 
 def detectability(difference: np.ndarray, known: np.ndarray) -> float:
-    """Sigmas that are left of a difference (n,) once what is roughly known has been fitted."""
+    """Size in sigmas of a difference (n,), after the roughly known numbers have been fitted."""
     inner = known.T @ known + np.eye(known.shape[1])
     off = known.T @ difference
     return float(np.sqrt(max(difference @ difference - off @ np.linalg.solve(inner, off), 0.0)))
 
 
 def _size(case: Case, seed: int, trials: tuple[int, ...], seconds: float) -> None:
-    """Scale what is hidden until each shows at about case.sigma; `reached` says how far that went.
+    """Scale the hidden effects until each has about case.sigma; `reached` is the value obtained.
 
-    Responses are not linear (casters begin to shimmy), so a size is tried again.
+    Responses are not linear (casters begin to shimmy), so the scaling is iterated.
     """
     chosen = [MANOEUVRES[k] for k in trials]
     plain = World(np.random.default_rng([seed, 2]), {})
@@ -520,12 +522,12 @@ def _size(case: Case, seed: int, trials: tuple[int, ...], seconds: float) -> Non
             else:
                 world = World(np.random.default_rng([seed, 2]), {name: case.hidden[name]})
                 exact = [run(world, man, seconds)[0] for man in chosen]
-            # a place or speed that starts afresh for one channel alone is no motion
+            # a new initial position or speed of one channel alone is not a possible motion
             moves = not name.startswith("sensor")
             case.reached[name] = detectability(apart(exact, without, moves), known)
             factor = case.sigma / max(case.reached[name], 1e-6)
             if 0.8 < factor < 1.25 or scaled(first, name, 1.2 * size) == case.hidden[name]:
-                break  # or at the largest size that it may have
+                break  # or the largest size is reached
             low, high = (max(low, size), high) if factor > 1.0 else (low, min(high, size))
             size *= float(np.clip(factor, 0.02, 6.0))
             if not low < size < high:
@@ -542,7 +544,7 @@ def _fault(case: Case, exact: dict) -> dict:
     return out
 
 
-MOST = {  # beyond these the chair is another vehicle
+MOST = {  # largest sizes; beyond them the chair is no longer plausible
     "toe": 0.08,
     "camber": 0.25,
     "wheel_radius": 0.02,
@@ -560,7 +562,7 @@ MOST = {  # beyond these the chair is another vehicle
     "floor_slope": 0.06,
     "wind": 8.0,
     "air_drag": 4.0,
-    "rider_sway": 0.15,
+    "rider_motion": 0.15,
     "turning_scrub": 15.0,
     "caster_friction": 4.0,
     "surface_patch": 0.2,
@@ -572,7 +574,7 @@ def scaled(p: dict[str, float], name: str, factor: float) -> dict[str, float]:
     """An effect of another size, at the same place and time."""
     fixed = {
         "surface_patch": ("x", "y", "radius"),
-        "rider_sway": ("mass", "frequency", "phase"),
+        "rider_motion": ("mass", "frequency", "phase"),
         "payload": ("height",),
         "gust": ("when", "way"),
     }.get(name, ())

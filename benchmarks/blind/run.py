@@ -11,7 +11,6 @@ import argparse
 import json
 import os
 import shutil
-import sys
 import time
 import traceback
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -19,19 +18,22 @@ from multiprocessing import get_context
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).parent))
 
-from cases import case
+import planar
+from cases import case, planar_case
 from generator import SEAL, make, unseal
 from table import table
 
 import mjchair
 
 
-def one(folder: Path, number: int, seed: int, trials: int, seconds: float, threads: int) -> dict:
+def one(
+    folder: Path, number: int, seed: int, trials: int, seconds: float, threads: int, how: str
+) -> dict:
     """Make, diagnose, and only then open the seal of one study."""
-    study = folder / f"study_{seed}_{number:03d}"
-    make(study, case(number, seed), 1000 * seed + number, trials, seconds, held=number % trials)
+    study = folder / f"study_{how}_{seed}_{number:03d}"
+    hidden, maker = (case, make) if how == "mujoco" else (planar_case, planar.make)
+    maker(study, hidden(number, seed), 1000 * seed + number, trials, seconds, held=number % trials)
     began = time.perf_counter()
     try:
         found = mjchair.diagnose(study, threads=threads).to_dict()
@@ -64,17 +66,20 @@ def main() -> None:
     parser.add_argument("--trials", type=int, default=6)
     parser.add_argument("--seconds", type=float, default=6.0)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--generator", choices=("mujoco", "planar"), default="mujoco")
     parser.add_argument("--work", type=Path, default=Path("out/blind"))
     args = parser.parse_args()
     args.work.mkdir(parents=True, exist_ok=True)
-    path = args.work / f"results_{args.seed}.jsonl"
+    path = args.work / f"results_{args.generator}_{args.seed}.jsonl"
     done = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
     have = {line["number"] for line in done}
     todo = [n for n in range(args.first, args.first + args.count) if n not in have]
     threads = max(1, (os.cpu_count() or 1) // args.workers)
     with ProcessPoolExecutor(args.workers, get_context("spawn")) as pool:
         running = [
-            pool.submit(one, args.work, n, args.seed, args.trials, args.seconds, threads)
+            pool.submit(
+                one, args.work, n, args.seed, args.trials, args.seconds, threads, args.generator
+            )
             for n in todo
         ]
         for future in as_completed(running):

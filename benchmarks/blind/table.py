@@ -1,4 +1,4 @@
-"""The table of a blind run: what was asked for, and what was reached.
+"""The table of a blind run: aims and results.
 
 python benchmarks/blind/table.py out/blind/results_100.jsonl
 """
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-CLEAR = 12.0  # sigmas that an effect shows at, beside what is roughly known: asked for 15 or more
+CLEAR = 12.0  # least sigmas reached by an effect that is counted as one of 15 sigma or more
 SHOWS = "15 sigma or more"
 OPEN = ("unknown", "ambiguous")
 ALIKE = 0.95  # |cos| beyond which two effects cannot be told apart
@@ -29,12 +29,12 @@ def clear(line: dict) -> bool:
 
 
 def named(line: dict) -> set[str]:
-    """Names that a verdict commits to."""
+    """Names that a verdict states without an alternative."""
     return {e["name"] for e in line["effects"]} if line["verdict"] == "named" else set()
 
 
 def returned(line: dict) -> set[str]:
-    """All names that a verdict leaves standing."""
+    """All names that a verdict does not exclude."""
     if line["verdict"] not in ("named", "ambiguous"):
         return set()
     return {e["name"] for e in line["effects"]} | {n for g in line["alternatives"] for n in g}
@@ -46,7 +46,7 @@ def first(line: dict) -> str:
 
 
 def alone(line: dict) -> bool:
-    """Whether no other effect looks like what was put first."""
+    """Whether no other effect is similar to the one that was put first."""
     return not any(c["name"] != first(line) and c["collinear"] > ALIKE for c in line["candidates"])
 
 
@@ -56,12 +56,12 @@ def right(line: dict) -> bool:
 
 
 def kept(line: dict) -> bool:
-    """Whether everything that was hidden is among the names left standing."""
+    """Whether all hidden effects are among the names that are not excluded."""
     return truth(line) <= returned(line)
 
 
 def wrong(line: dict) -> bool:
-    """Whether a verdict commits to a name that was not hidden."""
+    """Whether a verdict states a name that was not hidden."""
     return bool(named(line) - truth(line))
 
 

@@ -1,0 +1,173 @@
+"""`mjchair diagnose`: measured runs in, a verdict, a report and a corrected chair out."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mjchair.commands import options
+from mjchair.errors import MjchairError
+
+if TYPE_CHECKING:
+    from mjchair.diagnosis.data.study import Study
+    from mjchair.diagnosis.result import Diagnosis
+
+CACHE = "unfinished"  # simulations of a diagnosis that was interrupted
+TOP = (
+    "verdict",
+    "effects",
+    "alternatives",
+    "candidates",
+    "gap",
+    "where",
+    "next_experiment",
+    "probability",
+    "more_missing",
+    "material",
+    "process",
+    "drivers",
+    "notes",
+)
+GAP = ("before", "after", "noise_floor", "scope")
+CANDIDATE = ("name", "channel", "held_out_gain", "closure", "detectability", "p_value")
+
+
+def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the subcommand."""
+    parser = subparsers.add_parser(
+        "diagnose",
+        help="find the effect that a model misses in measured runs",
+        description="Find where a model and measured runs disagree, name the missing effect, add "
+        "it. Writes diagnosis.json, report.html, model.xml and figures into --out. The same "
+        "command goes on with an interrupted diagnosis.",
+    )
+    parser.add_argument("study", metavar="STUDY", help="folder with study.toml and its tables")
+    parser.add_argument(
+        "--effect",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="an effect of your own, see docs/diagnosis.md",
+    )
+    parser.add_argument("--threads", type=int, default=2, help="default: %(default)s")
+    options.add_output(parser, "out/diagnose")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Diagnose, write everything, and print the verdict on one line."""
+    from mjchair.diagnosis.data.study_file import read_study
+    from mjchair.diagnosis.diagnose import diagnose
+    from mjchair.diagnosis.replay.cache import Store
+    from mjchair.effects import user_file
+    from mjchair.storage import check_vacant, output_folder
+
+    if args.threads < 1:
+        raise MjchairError(f"--threads is {args.threads}; it must be at least 1")
+    kept = Path(args.out) / CACHE
+    force = args.force or _interrupted(kept)
+    check_vacant(args.out, force)
+    study = read_study(args.study)
+    effects = [user_file.from_file(path) for path in args.effect]
+    for effect in effects:
+        user_file.check(effect, study.spec)
+    folder = output_folder(args.out, force)
+    try:
+        with _progress() as say:
+            found = diagnose(
+                study, effects=effects, say=say, store=Store(kept), threads=args.threads
+            )
+            say("report")
+            _write(folder, kept, study, found)
+    except MjchairError:
+        _clear(folder, kept)
+        raise
+    except KeyboardInterrupt:
+        said = f"interrupted; what was computed is in {kept}, and the same command goes on from it"
+        print(f"mjchair: {said}", file=sys.stderr)
+        return 130
+    shutil.rmtree(kept, ignore_errors=True)
+    print(f"{_line(found)}; see {folder}/report.html")
+    return 0
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str], None]]:
+    """What to call as a stage begins; shown on a terminal only."""
+    from tqdm import tqdm
+
+    layout = "{elapsed} {n_fmt} stages{postfix}"
+    with tqdm(unit="stage", disable=None, bar_format=layout) as bar:
+
+        def say(stage: str) -> None:
+            bar.set_postfix_str(stage)
+            bar.update()
+
+        yield say
+
+
+def _write(folder: Path, kept: Path, study: Study, found: Diagnosis) -> None:
+    """Make everything first, then write it beside the simulations, then move it, verdict last."""
+    from mjchair.diagnosis.diagnose import corrected
+    from mjchair.model.spec import compile_spec, exact_xml
+    from mjchair.report import diagnosis_replay
+    from mjchair.report.diagnosis_page import figures, page
+    from mjchair.storage import write_whole
+
+    exact_xml()
+    spec = corrected(study, found)
+    compile_spec(spec)
+    drawn = figures(found)
+    files: dict[str, str | bytes] = {f"{name}.png": image for name, image in drawn.items()}
+    files["model.xml"] = spec.to_xml()
+    title = f"Diagnosis of {Path(study.source).resolve().name}"
+    shown = diagnosis_replay.section(study, found)
+    files["report.html"] = page(found, drawn, title, shown)
+    files["diagnosis.json"] = json.dumps(contract(found), indent=1, allow_nan=False) + "\n"
+    for name, content in files.items():
+        write_whole(kept / name, content)
+    for name in files:
+        (kept / name).replace(folder / name)
+
+
+def contract(found: Diagnosis) -> dict[str, Any]:
+    """What diagnosis.json holds; a sensor's effect has its channel besides."""
+    everything = found.to_dict()
+    out = {key: everything[key] for key in TOP}
+    out["gap"] = {key: out["gap"][key] for key in GAP}
+    out["candidates"] = [{k: c[k] for k in CANDIDATE if k in c} for c in out["candidates"]]
+    return out
+
+
+def _clear(folder: Path, kept: Path) -> None:
+    """Leave nothing of a study that could not be diagnosed."""
+    shutil.rmtree(kept, ignore_errors=True)
+    if not any(folder.iterdir()):
+        folder.rmdir()
+
+
+def _interrupted(kept: Path) -> bool:
+    """Whether the output folder holds an interrupted diagnosis, whose verdict comes last."""
+    return kept.is_dir() and not (kept.parent / "diagnosis.json").exists()
+
+
+def _line(found: Diagnosis) -> str:
+    """Verdict, effects and gap on one line."""
+    names = ", ".join(e.name for e in found.effects) or "no effect"
+    sets = " / ".join(" or ".join(group) for group in found.alternatives)
+    gap = found.gap
+    assert gap is not None
+    return (
+        f"{found.verdict}: {names}"
+        + (f"; cannot be told apart: {sets}" if sets else "")
+        + ("; more is missing" if found.more_missing else "")
+        + f"; gap {gap.before:.2f}"
+        + (f" -> {gap.after:.2f}" if gap.after is not None else "")
+        + f" (noise {gap.noise_floor:.2f})"
+    )

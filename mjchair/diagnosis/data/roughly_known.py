@@ -1,0 +1,126 @@
+"""What is only roughly known of any chair: fitted along with every effect, held by priors.
+
+In: the channels of a study, and the standard deviations that it gives. Out: nuisances, each an edit
+of the chair, or the bias or scale of a sensor. Without fitting them a heavier rider becomes a false
+name; without priors they swallow effects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from mjchair.effects import wheel_radius
+from mjchair.effects.effect import SensorError
+from mjchair.errors import MjchairError, nearest
+from mjchair.measurement.sensors import sensor
+from mjchair.model import inertials, parts
+from mjchair.tire import block
+
+Edit = Callable[[mujoco.MjSpec, float], None]
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """A roughly known number.
+
+    Attributes:
+      name: as in study.toml. std: prior standard deviation, in `unit`.
+      edit: ``edit(spec, value)``, value 0 being no change; None for a sensor's bias or scale.
+      channel, error: of a sensor, and what it does.
+    """
+
+    name: str
+    std: float
+    unit: str
+    edit: Edit | None = None
+    channel: str = ""
+    error: SensorError = SensorError.BIAS
+
+
+def _mass(spec: mujoco.MjSpec, value: float) -> None:
+    body = inertials.explicit(spec, "chair")
+    body.mass = float(body.mass) * (1.0 + value)
+    body.inertia = np.asarray(body.inertia) * (1.0 + value)
+
+
+def _inertia(spec: mujoco.MjSpec, value: float) -> None:
+    body = inertials.explicit(spec, "chair")
+    body.inertia = np.asarray(body.inertia) * (1.0 + value)
+
+
+def _wheel_inertia(spec: mujoco.MjSpec, value: float) -> None:
+    for wheel in parts.REAR:
+        body = inertials.explicit(spec, wheel)
+        body.inertia = np.asarray(body.inertia) * (1.0 + value)
+
+
+def _centre(axis: int) -> Edit:
+    def edit(spec: mujoco.MjSpec, value: float) -> None:
+        body = inertials.explicit(spec, "chair")
+        place = np.array(body.ipos, float)
+        place[axis] += value
+        body.ipos = place
+
+    return edit
+
+
+def _rolling_radius(spec: mujoco.MjSpec, value: float) -> None:
+    """Of both rear wheels together: pressure and load change it, and nobody measures it loaded."""
+    wheel_radius.EFFECT.apply(spec, {"left": value, "right": value})
+
+
+def _stiffness(wheels: tuple[str, ...]) -> Edit:
+    def edit(spec: mujoco.MjSpec, value: float) -> None:
+        parts.scale_tires(spec, block.STIFFNESS_FACTOR, 1.0 + value, wheels)
+
+    return edit
+
+
+MECHANICAL = (
+    Nuisance("mass", 0.05, "1", _mass),
+    Nuisance("inertia", 0.10, "1", _inertia),
+    Nuisance("wheel_inertia", 0.05, "1", _wheel_inertia),
+    Nuisance("centre_x", 0.01, "m", _centre(0)),
+    Nuisance("centre_y", 0.002, "m", _centre(1)),
+    Nuisance("centre_z", 0.03, "m", _centre(2)),
+    Nuisance("rear_stiffness", 0.07, "1", _stiffness(parts.REAR)),
+    Nuisance("caster_stiffness", 0.07, "1", _stiffness(parts.CASTERS)),
+    Nuisance("rolling_radius", 0.0015, "m", _rolling_radius),
+)
+
+
+def nuisances(channels: tuple[str, ...], given: Mapping[str, float]) -> tuple[Nuisance, ...]:
+    """The nuisances of a study, with the standard deviations that it gives.
+
+    Raises:
+      MjchairError: a name that is not a nuisance.
+    """
+    every = list(MECHANICAL)
+    for channel in channels:
+        kind = sensor(channel)
+        if kind.bias is not None:
+            every.append(Nuisance(f"bias:{channel}", kind.bias, kind.unit, None, channel))
+        gain = given.get(f"scale:{channel}", kind.gain)
+        if gain is not None:
+            name = f"scale:{channel}"
+            every.append(Nuisance(name, gain, "1", None, channel, SensorError.SCALE))
+    vectors = {"imu_gyro", "imu_accelerometer"}
+    known = {n.name for n in every} | {f"{what}:{v}" for what in ("bias", "scale") for v in vectors}
+    for name in given:
+        if name not in known:
+            raise MjchairError(f"unknown nuisance {name!r}" + nearest(name, known))
+    return tuple(
+        Nuisance(
+            n.name,
+            given.get(n.name, given.get(n.name.rsplit(".", 1)[0], n.std)),
+            n.unit,
+            n.edit,
+            n.channel,
+            n.error,
+        )
+        for n in every
+    )

@@ -1,0 +1,160 @@
+"""A study: measured runs, the chair they are to be explained by, and what is known beforehand.
+
+In: runs in memory (study_file.py reads them from a folder) and a chair. Out: a `Study`, checked;
+what cannot be right is refused in one line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import mujoco
+
+from mjchair.diagnosis.data import trial_checks, unit_checks
+from mjchair.errors import MjchairError
+from mjchair.measurement.trial import Trial, check_columns
+from mjchair.model.rolling import RearAxle, rear_axle
+from mjchair.simulation.initial import Initial
+
+
+@dataclass(frozen=True)
+class Run:
+    """One measured run of a study.
+
+    Attributes:
+      trial: the samples, SI. manoeuvre: word that groups runs.
+      hold_out: kept for the final check. initial: what is known of the first sample; fields that
+        were not given are estimated. given: names of the fields that were given.
+    """
+
+    trial: Trial
+    manoeuvre: str
+    hold_out: bool
+    initial: Initial
+    given: frozenset[str]
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last sample, s."""
+        return float(self.trial.time[-1] - self.trial.time[0])
+
+
+@dataclass(frozen=True)
+class Study:
+    """Measured runs and the specification that is to explain them.
+
+    Attributes:
+      spec: the chair in its scene. runs: in order.
+      noise: channel -> standard deviation (SI), where it is known.
+      process: drive (N), side (N), yaw (N m) -> standard deviation of what shakes the chair, where
+        it is known.
+      indoors: whether no wind blows. material: force (N) below which nothing matters to the person
+        who asks; None: not told.
+      torque_measured: whether the torques were measured at push rims; False: they are commands.
+      copied: channels of a wheel that was not measured, taken to be like the other's.
+      nuisance: name -> standard deviation, where it differs from the defaults.
+      axle: the rear wheels of the chair.
+      notes: what was noticed while reading, one line each.
+      source: the folder.
+    """
+
+    spec: mujoco.MjSpec
+    runs: tuple[Run, ...]
+    noise: Mapping[str, float]
+    nuisance: Mapping[str, float]
+    axle: RearAxle
+    notes: tuple[str, ...] = ()
+    source: str = "study"
+    process: Mapping[str, float] = field(default_factory=dict)
+    indoors: bool = False
+    material: float | None = None
+    torque_measured: bool = False
+    copied: frozenset[str] = frozenset()
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Scalar channels that some run measured, in a fixed order."""
+        measured = {c for run in self.runs for c in run.trial.channels}
+        return tuple(sorted(measured))
+
+    @property
+    def fitted(self) -> tuple[int, ...]:
+        """Indices of the runs that are not held out."""
+        return tuple(i for i, run in enumerate(self.runs) if not run.hold_out)
+
+
+def make_study(
+    spec: mujoco.MjSpec,
+    runs: list[Run],
+    noise: Mapping[str, float] | None = None,
+    nuisance: Mapping[str, float] | None = None,
+    notes: list[str] | None = None,
+    source: str = "study",
+) -> Study:
+    """A study of runs in memory, checked.
+
+    Raises:
+      MjchairError: no run, every run held out, a run too short, or a column that the chair has no
+        sensor or actuator for.
+    """
+    if not runs:
+        raise MjchairError(f"{source}: no trial; a study needs at least one [[trial]]")
+    if all(run.hold_out for run in runs):
+        raise MjchairError(f"{source}: every trial is held out; leave at least one to fit to")
+    model = spec.copy().compile()
+    axle = rear_axle(model)
+    checked, said = [], list(notes or [])
+    for run in runs:
+        check_columns(run.trial, model)
+        trial, noticed = _checked(run.trial, axle)
+        checked.append(replace(run, trial=trial))
+        said += noticed
+    said += _without_heading(checked)
+    return Study(
+        spec=spec,
+        runs=tuple(checked),
+        noise=dict(noise or {}),
+        nuisance=dict(nuisance or {}),
+        axle=axle,
+        notes=tuple(said),
+        source=source,
+    )
+
+
+def with_copied_wheels(study: Study) -> Study:
+    """The study with one measured wheel standing for both in runs that tell nothing of a turn."""
+    runs = [replace(run, trial=trial_checks.with_copied_wheel(run.trial)) for run in study.runs]
+    copied = {
+        c
+        for run, before in zip(runs, study.runs, strict=True)
+        for c in set(run.trial.channels) - set(before.trial.channels)
+    }
+    return replace(study, runs=tuple(runs), copied=frozenset(copied))
+
+
+def _without_heading(runs: list[Run]) -> list[str]:
+    """A note on the runs of which nothing tells where in the world they head."""
+    tells = ({"heading"}, {"position.x", "position.y"})
+    blind = [
+        run.trial.name
+        for run in runs
+        if "heading" not in run.given and not any(t <= set(run.trial.channels) for t in tells)
+    ]
+    if not blind:
+        return []
+    return [
+        f"the heading of {', '.join(blind)} is neither measured nor given; each is taken to start "
+        "at heading 0, and a slope or a wind is one along or across that"
+    ]
+
+
+def _checked(trial: Trial, axle: RearAxle) -> tuple[Trial, list[str]]:
+    """The trial as it is used, and what was noticed."""
+    said = []
+    for stage in (trial_checks.measured_part, trial_checks.without_dead, trial_checks.other_side):
+        trial, noticed = stage(trial)
+        said += noticed
+    trial_checks.check(trial)
+    unit_checks.check(trial, axle)
+    return trial, said

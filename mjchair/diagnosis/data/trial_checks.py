@@ -1,0 +1,225 @@
+"""What there is of a measured run: its span, its clock, dead channels, and what drove it.
+
+In: a trial as it was read. Out: the trial as it is used and notes on what was left out, or one line
+on why it cannot be used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+
+from mjchair.errors import MjchairError
+from mjchair.measurement.trial import Trial
+from mjchair.model.wheels import base_name
+from mjchair.rider.anatomy import JOINT_NAMES
+from mjchair.simulation.inputs import Inputs
+from mjchair.simulation.table import Array
+
+SHORTEST = 1.0  # s, of a run: less holds no window
+SLOWEST = 0.1  # s, between samples: slower holds too few for a window
+GAP = 0.5  # s without any sample, beyond which a clock jumps
+COVERS = 0.1  # s, of a run's start and end that its inputs may leave open
+SPAN = 0.25  # s, over which a channel is averaged to see whether the chair moves
+STILL = {  # averages below which a channel says that the chair stands, SI
+    "_speed": 0.1,
+    "velocity.x": 0.03,
+    "velocity.y": 0.03,
+    "gyro.z": 0.1,
+    "accelerometer.x": 0.2,
+}
+STAYS = {"_angle": 0.1, "position.x": 0.05, "position.y": 0.05, "heading": 0.05}  # ranges, SI
+MOVES = (*STILL, "_angle", "position.x", "accelerometer.z")  # a rolling chair's are not zero
+SIDES = {"left": "right", "right": "left"}
+TURNS = {"imu_gyro.z", "heading", "position.y", "velocity.y"}  # tell how a chair turns
+
+
+def measured_part(trial: Trial) -> tuple[Trial, list[str]]:
+    """The run from its first to its last measurement, and a note where its inputs go beyond."""
+    there = np.any([~np.isnan(v) for v in trial.channels.values()], axis=0)
+    rows = np.flatnonzero(there)
+    kept = slice(int(rows[0]), int(rows[-1]) + 1)
+    if kept == slice(0, trial.time.size):
+        return trial, []
+    time = trial.time[kept]
+    part = replace(
+        trial,
+        time=time,
+        channels=_rows(trial.channels, kept),
+        other=_rows(trial.other, kept),
+    )
+    return part, [
+        f"{trial.name}: nothing was measured before {time[0]:g} s or after {time[-1]:g} s; "
+        "what the table has there is left out"
+    ]
+
+
+def _rows(columns: Mapping[str, Array], kept: slice) -> Mapping[str, Array]:
+    return MappingProxyType({name: values[kept] for name, values in columns.items()})
+
+
+def check(trial: Trial) -> None:
+    """Refuse a run whose clock cannot be right, or whose inputs leave a part of it open.
+
+    Raises:
+      MjchairError: too short, too few samples, a clock that jumps, inputs outside the run's time.
+    """
+    _check_length(trial)
+    _check_clock(trial)
+    if trial.inputs is not None:
+        _check_inputs(trial, trial.inputs)
+
+
+def _check_length(trial: Trial) -> None:
+    lasts = float(trial.time[-1] - trial.time[0])
+    if lasts < SHORTEST:
+        raise MjchairError(
+            f"trial {trial.name} lasts {lasts:.2g} s; it must last at least {SHORTEST:g} s, "
+            "which is one window"
+        )
+
+
+def _check_clock(trial: Trial) -> None:
+    steps = np.diff(trial.time)
+    usual, worst = float(np.median(steps)), int(np.argmax(steps))
+    if usual > SLOWEST:
+        unit = "is it in ms? name it time [ms]" if usual > 1.0 else "sample it faster"
+        raise MjchairError(
+            f"{trial.name}: a sample comes every {usual:g} s; at most {SLOWEST:g} s may lie "
+            f"between two; {unit}"
+        )
+    if steps[worst] > GAP:
+        raise MjchairError(
+            f"{trial.name}: the clock jumps from {trial.time[worst]:g} to "
+            f"{trial.time[worst + 1]:g} s; cut the trial in two there"
+        )
+
+
+def _check_inputs(trial: Trial, inputs: Inputs) -> None:
+    first, last = float(trial.time[0]), float(trial.time[-1])
+    for name, values in inputs.controls.items():
+        if base_name(name) in JOINT_NAMES:  # held before and after, and interpolated between
+            continue
+        time = inputs.time[~np.isnan(values)]
+        if time[0] > first + COVERS or time[-1] < last - COVERS:
+            raise MjchairError(
+                f"{trial.name}: {name} is there from {time[0]:g} to {time[-1]:g} s, and the run "
+                f"lasts from {first:g} to {last:g} s; write 0 where nothing drives, or cut the run"
+            )
+        inside = time[(time >= first - GAP) & (time <= last + GAP)]
+        if inside.size > 1 and np.diff(inside).max() > GAP:
+            at = int(np.argmax(np.diff(inside)))
+            raise MjchairError(
+                f"{trial.name}: {name} is not there from {inside[at]:g} to {inside[at + 1]:g} s; "
+                "write 0 where nothing drives, or cut the trial in two there"
+            )
+
+
+def averaged(time: Array, values: Array, span: float = SPAN) -> tuple[Array, Array]:
+    """Times (s), a fifth of the span apart, and the means of a channel over the span around them.
+
+    Args:
+      time, values: samples that are there, (n,).
+    """
+    grid = np.arange(time[0] + 0.5 * span, time[-1] - 0.5 * span, 0.2 * span)
+    total = np.r_[0.0, np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time))]
+    after, before = (np.interp(grid + s * span, time, total) for s in (0.5, -0.5))
+    return grid, np.asarray((after - before) / span)
+
+
+def _end(name: str, endings: Iterable[str]) -> str | None:
+    return next((end for end in endings if name.endswith(end)), None)
+
+
+def _stands(trial: Trial) -> bool:
+    """Whether every channel, where it can tell, says that the chair stands."""
+    for name in trial.channels:
+        _, mean = averaged(*trial.samples(name))
+        if not mean.size:
+            continue
+        end = _end(name, STILL)
+        if end and np.abs(mean).max() > STILL[end]:
+            return False
+        end = _end(name, STAYS)
+        if end and np.ptp(mean) > STAYS[end]:
+            return False
+    return True
+
+
+def without_dead(trial: Trial) -> tuple[Trial, list[str]]:
+    """The run without channels that are zero throughout while the chair moves.
+
+    Raises:
+      MjchairError: no channel is left.
+    """
+    zero = {n for n, v in trial.channels.items() if not np.nan_to_num(v).any()}
+    if zero == set(trial.channels):
+        raise MjchairError(f"{trial.name}: every channel is zero throughout; nothing was measured")
+    dead = [n for n in trial.channels if n in zero and _end(n, MOVES)]
+    if not dead or _stands(trial):
+        return trial, []
+    left = {n: v for n, v in trial.channels.items() if n not in dead}
+    said = [f"{trial.name}: {n} is exactly zero throughout; it is left out" for n in dead]
+    return replace(trial, channels=MappingProxyType(left)), said
+
+
+def tells_turning(channels: Iterable[str]) -> bool:
+    """Whether these channels tell how the chair turns."""
+    names = set(channels)
+    return len(_sides_seen(names)) == 2 or bool(TURNS & names)
+
+
+def _sides_seen(channels: Iterable[str]) -> list[str]:
+    """The sides whose rear wheel was measured."""
+    names = set(channels)
+    return [s for s in SIDES if {f"{s}_wheel_speed", f"{s}_wheel_angle"} & names]
+
+
+def with_copied_wheel(trial: Trial) -> Trial:
+    """The run with the channels of its one measured wheel copied to the other one.
+
+    Assumed alike means no turn: were the other wheel left free, a turn that dies out would pass for
+    a deceleration. A run that tells how it turns, or measures no wheel, stays as it is.
+    """
+    seen = _sides_seen(trial.channels)
+    if len(seen) != 1 or tells_turning(trial.channels):
+        return trial
+    side = seen[0]
+    more = {
+        f"{SIDES[side]}{name.removeprefix(side)}": values
+        for name, values in trial.channels.items()
+        if name in (f"{side}_wheel_speed", f"{side}_wheel_angle")
+    }
+    return replace(trial, channels=MappingProxyType({**trial.channels, **more}))
+
+
+def other_side(trial: Trial) -> tuple[Trial, list[str]]:
+    """The run with the wheel that was not measured taken to be like the other one, and a note.
+
+    Where nothing tells how the chair turns, one instrumented wheel stands for both. Where the
+    other wheel or a turn was measured, a wheel without a torque column is not driven.
+    """
+    driven = [
+        s for s in SIDES if trial.inputs is not None and f"{s}_wheel" in trial.inputs.controls
+    ]
+    seen = _sides_seen(trial.channels)
+    turns = tells_turning(trial.channels)
+    if turns and len(driven) == 1:
+        other = SIDES[driven[0]]
+        return trial, [f"{trial.name}: no torque column of the {other} wheel; it is not driven"]
+    if turns or len(driven) == 2 or not (driven or len(seen) == 1):
+        return trial, []
+    side = (driven or seen)[0]
+    said = (
+        f"{trial.name}: only the {side} wheel was measured; the {SIDES[side]} one is assumed "
+        "alike, and nothing tells how the chair turns"
+    )
+    if not driven or trial.inputs is None:
+        return trial, [said]
+    controls = dict(trial.inputs.controls)
+    controls[f"{SIDES[side]}_wheel"] = controls[f"{side}_wheel"]
+    inputs = replace(trial.inputs, controls=controls)
+    return replace(trial, inputs=inputs), [said]

@@ -1,0 +1,229 @@
+"""Whether measured channels can be in the units that they are taken for.
+
+In: a trial, and the rear axle of the chair. Out: nothing, or one line that names the channel and
+the unit that it looks like. Three ways to know: no chair is that fast; two channels tell one story
+in two units; a level accelerometer shows gravity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import combinations
+from typing import NamedTuple, NoReturn
+
+import numpy as np
+
+from mjchair.diagnosis.data.trial_checks import averaged
+from mjchair.errors import MjchairError
+from mjchair.measurement.sensors import rolls, sensor
+from mjchair.measurement.trial import Trial
+from mjchair.model.rolling import RearAxle
+from mjchair.simulation.table import Array
+
+DEGREES, GRAVITY = 180.0 / np.pi, 9.81
+TORQUE = 500.0  # N m, the most that a hand or a motor gives
+TURN = 2.0 * np.pi + 0.2  # rad, within which a heading begins
+NEAR = 1.3  # factor within which two stories differ by a unit
+ALIKE = 0.95  # cosine of two stories that are one
+FORWARD, YAW, PULL = 0.05, 0.03, 0.05  # m/s, rad/s and m/s: motion below which nothing is compared
+
+
+class Story(NamedTuple):
+    """What a channel says of one motion: times (s), values (SI if its unit is), unit to advise."""
+
+    time: Array
+    values: Array
+    unit: str
+
+
+def check(trial: Trial, axle: RearAxle) -> None:
+    """Refuse channels in other units than SI, where that can be known.
+
+    Args:
+      axle: of the chair, which ties its channels to one another.
+
+    Raises:
+      MjchairError: naming the channel and what it looks like.
+    """
+    _check_limits(trial, axle)
+    _check_rates(trial, axle)
+    _check_torque(trial)
+    _check_gravity(trial)
+    _compare(trial, _forward(trial, axle), FORWARD)
+    _compare(trial, _turning(trial, axle), YAW)
+    _compare_with_acceleration(trial, axle)
+
+
+def check_initial(given: Mapping[str, object], name: str) -> None:
+    """Refuse a first heading in degrees.
+
+    Raises:
+      MjchairError: a heading of more than a turn.
+    """
+    heading = given.get("heading", 0.0)
+    if isinstance(heading, int | float) and abs(heading) > TURN:
+        raise MjchairError(
+            f"{name}: the initial heading looks like degrees: it is {heading:g}, and a turn is "
+            f"6.28 rad; give {heading / DEGREES:.4g}"
+        )
+
+
+def _refuse(trial: Trial, name: str, what: str, why: str, unit: str) -> NoReturn:
+    header = f"; give SI, or the unit in its header, as in {name} [{unit}]" if unit else ""
+    raise MjchairError(f"{trial.name}: {name} looks like {what}: {why}{header or '; give SI'}")
+
+
+def _size(values: Array) -> float:
+    return float(np.nanpercentile(np.abs(values), 95.0))
+
+
+def _limit(name: str, limit: float, axle: RearAxle) -> float:
+    """A limit of a channel; a wheel's, which is of the way that it rolls, in radians."""
+    return limit / axle.radius(name.split("_")[0]) if rolls(name) else limit
+
+
+def _check_limits(trial: Trial, axle: RearAxle) -> None:
+    for name, values in trial.channels.items():
+        kind = sensor(name)
+        if kind.most is None:
+            continue
+        limit, size = _limit(name, kind.most, axle), _size(values)
+        if size > limit:
+            what = "degrees" if kind.degrees and size <= DEGREES * limit else "other units"
+            why = f"it reaches {size:.3g}, and no chair passes {limit:.3g} in SI"
+            _refuse(trial, name, what, why, kind.degrees)
+
+
+def _check_rates(trial: Trial, axle: RearAxle) -> None:
+    for name in trial.channels:
+        kind = sensor(name)
+        if kind.fastest is None:
+            continue
+        limit, story = _limit(name, kind.fastest, axle), _rate(trial, name)
+        fastest = _size(story.values) if story.values.size else 0.0
+        if fastest > limit:
+            why = f"it turns by {fastest:.3g} a second, and no chair passes {limit:.3g} rad/s"
+            _refuse(trial, name, "degrees", why, "deg")
+        first = abs(float(trial.samples(name)[1][0]))
+        if kind.wraps and first > TURN:
+            _refuse(trial, name, "degrees", f"it begins at {first:.4g}, and a turn is 6.28", "deg")
+
+
+def _check_torque(trial: Trial) -> None:
+    for name, values in (trial.inputs.controls if trial.inputs is not None else {}).items():
+        if _size(values) > TORQUE:
+            why = (
+                f"it reaches {_size(values):.4g}, and neither hand nor motor passes {TORQUE:g} N m"
+            )
+            _refuse(trial, name, "N mm", why, "N mm")
+
+
+def _check_gravity(trial: Trial) -> None:
+    name = "imu_accelerometer.z"
+    if name not in trial.channels:
+        return
+    middle = float(np.nanmedian(trial.channels[name]))
+    why = f"it stays near {middle:.2f}, and a level sensor shows {GRAVITY}"
+    if 0.8 < abs(middle) < 1.2:
+        _refuse(trial, name, "g", why, "g")
+    if abs(middle) < 3.0:
+        raise MjchairError(
+            f"{trial.name}: {name} looks as if gravity was taken off: {why}; add it back, or leave "
+            "the column out"
+        )
+
+
+def _mean(trial: Trial, name: str, factor: float = 1.0, unit: str = "") -> Story:
+    time, values = averaged(*trial.samples(name))
+    return Story(time, factor * values, unit)
+
+
+def _rate(trial: Trial, name: str, factor: float = 1.0, unit: str = "deg") -> Story:
+    """How fast an angle or a place changes."""
+    time, values = trial.samples(name)
+    if sensor(name).wraps:
+        values = np.unwrap(values)
+    time, values = averaged(time, values)
+    if time.size < 3:
+        return Story(time[:0], values[:0], unit)
+    return Story(time, factor * np.gradient(values, time), unit)
+
+
+def _forward(trial: Trial, axle: RearAxle) -> dict[str, Story]:
+    """Channel -> how fast the chair rolls by it, m/s."""
+    stories = {}
+    for side in ("left", "right"):
+        if f"{side}_wheel_speed" in trial.channels:
+            stories[f"{side}_wheel_speed"] = _mean(
+                trial, f"{side}_wheel_speed", axle.radius(side), "deg/s"
+            )
+        if f"{side}_wheel_angle" in trial.channels:
+            stories[f"{side}_wheel_angle"] = _rate(trial, f"{side}_wheel_angle", axle.radius(side))
+    if "velocity.x" in trial.channels:
+        stories["velocity.x"] = _mean(trial, "velocity.x")
+    return stories
+
+
+def _turning(trial: Trial, axle: RearAxle) -> dict[str, Story]:
+    """Channel -> how fast the chair turns by it, rad/s."""
+    stories = {}
+    if "imu_gyro.z" in trial.channels:
+        stories["imu_gyro.z"] = _mean(trial, "imu_gyro.z", unit="deg/s")
+    if "heading" in trial.channels:
+        stories["heading"] = _rate(trial, "heading")
+    wheels = {side: f"{side}_wheel_speed" for side in ("left", "right")}
+    if all(w in trial.channels for w in wheels.values()):
+        left, right = (
+            _mean(trial, w, axle.radius(side) / axle.track) for side, w in wheels.items()
+        )
+        stories["wheels"] = Story(left.time, _at(right, left.time) - left.values, "")
+    return stories
+
+
+def _at(story: Story, time: Array) -> Array:
+    return np.interp(time, story.time, story.values) if story.time.size else np.zeros(time.size)
+
+
+def _compare(trial: Trial, stories: dict[str, Story], least: float) -> None:
+    """Channels that tell one story must tell it in one unit."""
+    for pair in combinations(stories, 2):
+        grid = stories[pair[0]].time
+        one, two = (_at(stories[name], grid) for name in pair)
+        sizes = np.linalg.norm(one), np.linalg.norm(two)
+        if min(sizes) <= least * np.sqrt(grid.size) or one @ two < ALIKE * sizes[0] * sizes[1]:
+            continue
+        large = int(sizes[1] > sizes[0])
+        ratio = sizes[large] / sizes[1 - large]
+        name, other = pair[large], pair[1 - large]
+        if DEGREES / NEAR < ratio < DEGREES * NEAR and stories[name].unit:
+            why = f"it tells {ratio:.1f} times what {_article(other)} does"
+            _refuse(trial, name, "degrees", why, stories[name].unit)
+
+
+def _article(name: str) -> str:
+    return "the difference of the wheels" if name == "wheels" else name
+
+
+def _compare_with_acceleration(trial: Trial, axle: RearAxle) -> None:
+    """A wheel's speed must change as the accelerometer says, but for what a slope does to it."""
+    name = "imu_accelerometer.x"
+    speeds = [c for c in ("left_wheel_speed", "right_wheel_speed") if c in trial.channels]
+    if name not in trial.channels or not speeds:
+        return
+    pull = _mean(trial, name)
+    seen = _mean(trial, speeds[0], axle.radius(speeds[0].split("_")[0]))
+    if pull.time.size < 8 or seen.time.size < 8:
+        return
+    gained = np.r_[0.0, np.cumsum(0.5 * (pull.values[1:] + pull.values[:-1]) * np.diff(pull.time))]
+    speed = _at(seen, pull.time)
+    ramp = np.column_stack([np.ones(pull.time.size), pull.time])  # a slope's part, and a bias'
+    speed, gained = (v - ramp @ np.linalg.lstsq(ramp, v, rcond=None)[0] for v in (speed, gained))
+    sizes = np.linalg.norm(speed), np.linalg.norm(gained)
+    if sizes[0] < PULL * np.sqrt(speed.size) or speed @ gained < ALIKE * sizes[0] * sizes[1]:
+        return
+    ratio = float(sizes[0] / sizes[1])
+    why = f"its speed changes {ratio:.1f} times as the accelerometer says"
+    if DEGREES / NEAR < ratio < DEGREES * NEAR:
+        _refuse(trial, speeds[0], "degrees", why, "deg/s")
+    if GRAVITY / NEAR < ratio < GRAVITY * NEAR:
+        _refuse(trial, name, "g", f"the wheels gain {ratio:.1f} times the speed that it tells", "g")

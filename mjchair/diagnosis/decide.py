@@ -1,0 +1,346 @@
+"""From the stages to a `Diagnosis`: verdict, effects, rivals, and what to do next.
+
+In: the chair as it was with its gap, and the choice of effects. Out: a `Diagnosis`. The rules
+themselves stand in rules.py; here their numbers are gathered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.evidence import evidence, missing_forces
+from mjchair.diagnosis.explain import hypotheses, missing_force
+from mjchair.diagnosis.explain.choice import Choice, closure, gain
+from mjchair.diagnosis.explain.column_ids import Quantity
+from mjchair.diagnosis.explain.gap import Gap, forces_left
+from mjchair.diagnosis.explain.left_out import held_out, held_out_gain
+from mjchair.diagnosis.explain.probability import of_effects, probabilities
+from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.column_ids import ParameterId
+from mjchair.diagnosis.fit.noise_levels import FORCES as FORCE_NAMES
+from mjchair.diagnosis.fit.nonlinear import Fitted
+from mjchair.diagnosis.fit.process import force_level
+from mjchair.diagnosis.fit.slow_part import BAND
+from mjchair.diagnosis.fit.system import System
+from mjchair.diagnosis.material import material
+from mjchair.diagnosis.next_experiment import design, wording
+from mjchair.diagnosis.next_experiment.design import Plan
+from mjchair.diagnosis.replay.pulses import Force
+from mjchair.diagnosis.result import (
+    Candidate,
+    Diagnosis,
+    Disagreement,
+    Estimate,
+    GapSummary,
+    MissingForce,
+    NamedEffect,
+    Nearest,
+    Stages,
+)
+from mjchair.diagnosis.rules import Verdict
+from mjchair.errors import MjchairError
+
+Array = NDArray[np.float64]
+TOP = 3  # drivers of a missing force that are worth a word
+SHOWN = 12  # windows and channels that are listed
+LEFT = 3.0  # sigmas of a missing force that is listed
+FORCES = 8  # of them
+EVENT = "event"  # something that happened once: no effect, but a rival of effects seen once
+
+
+def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
+    """What the stages say together."""
+    closed = closure(gap, base, choice.fitted, choice.after[-1]) if choice else 0.0
+    probability = probabilities(base, choice)
+    stands = standing(base, choice, closed, probability) if choice else None
+    said = rules.verdict(gap.exists, stands)
+    forces = missing_forces(base)
+    size = material(base, gap, choice)
+    before = _rms(*_slow(base.plain.system, _shown_windows(base)))
+    if not rules.matters(
+        force=size.value,
+        limit=size.limit,
+        gap=before,
+        told=base.bench.simulator.study.material is not None,
+        said=said,
+        sigmas=min(stands.sigmas, default=0.0) if stands else 0.0,
+    ):
+        said = Verdict.NONE
+    named = choice if said in (Verdict.NAMED, Verdict.AMBIGUOUS) else None
+    left = missing(choice.after[-1] if choice else gap)
+    plan, unplanned = _plan(base, named) if named and said == Verdict.AMBIGUOUS else (None, [])
+    return Diagnosis(
+        verdict=said,
+        effects=_named(named.fitted, closed) if named else [],
+        alternatives=_alternatives(base, named) if named and said == Verdict.AMBIGUOUS else [],
+        candidates=_candidates(base, gap, choice),
+        gap=_summary(base, gap, named),
+        where=_where(base),
+        next_experiment=_following(base, said, plan, left),
+        notes=[*_notes(base, choice, closed, said, left), *unplanned],
+        drivers=left,
+        nearest=_nearest(base, choice, closed) if choice and said == Verdict.UNKNOWN else None,
+        probability=probability,
+        more_missing=bool(named and stands and rules.more_missing(stands, len(_walls(named)))),
+        material=size,
+        process=_process(base),
+        terms=named.fitted.variant.terms if named else (),
+        correction=named.fitted.variant if named else None,
+        evidence=evidence(base, named.fitted if named else None, plan, forces),
+        stages=Stages(base=base, gap=gap, choice=choice),
+    )
+
+
+def _nearest(base: Base, choice: Choice, closed: float) -> Nearest:
+    """The explanation that is not named, with what it leaves."""
+    return Nearest(
+        effects=tuple(t.effect.key for t in choice.fitted.variant.terms),
+        closure=closed,
+        remainder=_rms(*_slow(choice.fitted.system, _shown_windows(base))),
+    )
+
+
+def standing(
+    base: Base, choice: Choice, closed: float, probability: Mapping[str, float]
+) -> rules.Standing:
+    """The numbers that the verdict on a choice follows from."""
+    fitted = choice.fitted
+    return rules.Standing(
+        closure=closed,
+        gap_left=choice.after[-1].exists,
+        gain_by_run=held_out_gain(base, fitted),
+        gain_by_manoeuvre=held_out_gain(base, fitted, "manoeuvre"),
+        sigmas=tuple(fitted.sigmas.values()),
+        at_bound=bool(fitted.at_bound),
+        rivals=sum(len(group) for group in choice.rivals),
+        probability=of_effects(probability, choice.hypothesis.keys),
+        once=_once(base, choice),
+        runs=len(base.bench.simulator.study.fitted),
+        held_out=_held_out(base, fitted),
+    )
+
+
+def _once(base: Base, choice: Choice) -> bool:
+    """Whether something that happened once, in one run, fits as well as the effects do."""
+    windows = base.bench.windows
+    return rules.happened_once(
+        base.plain.chi2 - choice.fitted.chi2, base.system.run[windows].astype(np.int64)
+    )
+
+
+def _walls(choice: Choice) -> list[str]:
+    """What is only roughly known and stands on its wall: pushed there by what is missing."""
+    offsets = choice.fitted.variant.offsets
+    return [name for name, by in offsets.items() if abs(by) > bounded.WALL - 1e-6]
+
+
+def _process(base: Base) -> dict[str, Estimate]:
+    """Standard deviation of what shakes the chair: drive, side, yaw."""
+    process = base.bench.process
+    if process is None:
+        return {}
+    units = {Force.FORWARD: "N", Force.LEFTWARD: "N", Force.YAW: "N m"}
+    return {
+        name: Estimate(value=force_level(process.levels, force), std=None, unit=units[force])
+        for name, force in FORCE_NAMES.items()
+    }
+
+
+def _held_out(base: Base, fitted: Fitted) -> rules.HeldOut | None:
+    held = _held_windows(base)
+    if not held.size:
+        return None
+    before, dof = _slow(base.plain.system, held)
+    return rules.HeldOut(before=before, after=_slow(fitted.system, held)[0], dof=dof)
+
+
+def _plan(base: Base, choice: Choice) -> tuple[Plan | None, list[str]]:
+    """The experiments that would decide, and lines on what could not be planned."""
+    near = [r.fitted for group in choice.rivals for r in group] or [base.plain]
+    try:
+        plan = design.plan(base.bench, choice.fitted, near)
+    except MjchairError as error:
+        return None, [str(error)]
+    return plan, list(plan.dropped)
+
+
+def _following(base: Base, said: Verdict, plan: Plan | None, left: list[MissingForce]) -> str:
+    """The next experiment in words; empty where none is needed."""
+    if plan is not None:
+        return wording.deciding(plan, base.bench.simulator)
+    if said == Verdict.UNKNOWN:
+        return wording.searching([(force.goes_with, force.sigmas) for force in left])
+    return ""
+
+
+def _alternatives(base: Base, choice: Choice) -> list[list[str]]:
+    """For every effect, the names that could stand in its place, itself first."""
+    out = []
+    for start, rivals in zip(choice.hypothesis.starts, choice.rivals, strict=True):
+        keys = {s.effect.key for s in choice.hypothesis.starts}
+        new = [
+            s.effect.name for r in rivals for s in r.hypothesis.starts if s.effect.key not in keys
+        ]
+        names = list(dict.fromkeys([start.effect.name, *new]))
+        if len(names) > 1:
+            out.append(names)
+    if _once(base, choice):
+        out.append([*(s.effect.name for s in choice.hypothesis.starts), EVENT])
+    return out
+
+
+def _named(fitted: Fitted, closed: float) -> list[NamedEffect]:
+    out = []
+    for term in fitted.variant.terms:
+        parameters = {
+            p.name: Estimate(
+                value=float(term.values[p.name]),
+                std=fitted.std.get(ParameterId(term.effect.key, p.name)),
+                unit=p.unit,
+            )
+            for p in term.effect.parameters
+        }
+        name, channel = term.effect.name, term.effect.channel
+        out.append(NamedEffect(name=name, parameters=parameters, closure=closed, channel=channel))
+    return out
+
+
+def _candidates(base: Base, gap: Gap, choice: Choice | None) -> list[Candidate]:
+    """Every effect alone, as it was screened."""
+    out = []
+    total = gain(base, choice.fitted) if choice else max(gap.excess, 1.0)
+    for h in hypotheses.singles(base.reduced, base.starts):
+        columns = base.system.index(h.columns)
+        gains = held_out(base.bench, (base.system, []), (base.system, columns))
+        effect = h.starts[0].effect
+        out.append(
+            Candidate(
+                name=effect.name,
+                held_out_gain=float(gains.sum()),
+                closure=float(np.clip(h.gain / max(total, h.gain, 1e-9), 0.0, 1.0)),
+                detectability=float(np.sqrt(max(h.gain, 0.0))),
+                p_value=float(stats.chi2.sf(h.gain, len(h.columns))),
+                collinear=(
+                    hypotheses.collinearity(base.reduced, h, choice.hypothesis) if choice else 0.0
+                ),
+                channel=effect.channel,
+            )
+        )
+    return sorted(out, key=lambda c: -c.held_out_gain)
+
+
+def _rms(chi2: float, dof: float) -> float:
+    return float(np.sqrt(max(chi2, 0.0) / max(dof, 1.0)))
+
+
+def _slow(system: System, windows: NDArray[np.int64]) -> tuple[float, float]:
+    """Chi2 of the slow residual of the windows, and its degrees of freedom."""
+    cells = [system.cells[int(i)] for i in windows]
+    return sum(c.total for c in cells), sum(c.total_dof for c in cells)
+
+
+def _held_windows(base: Base) -> NDArray[np.int64]:
+    held = {i for i, r in enumerate(base.bench.simulator.study.runs) if r.hold_out}
+    return np.array([i for i, w in enumerate(base.bench.simulator.windows) if w.run in held], int)
+
+
+def _shown_windows(base: Base) -> NDArray[np.int64]:
+    """Held-out windows, or all that were fitted to where none is held out."""
+    held = _held_windows(base)
+    return held if held.size else base.bench.windows
+
+
+def _summary(base: Base, gap: Gap, choice: Choice | None) -> GapSummary:
+    """The gap as it was, and as the corrected chair leaves it; without one there is no after."""
+    held, windows = _held_windows(base), _shown_windows(base)
+    before, dof = _slow(base.plain.system, windows)
+    who = "held-out trials" if held.size else "all trials, since none is held out"
+    return GapSummary(
+        before=_rms(before, dof),
+        after=_rms(_slow(choice.fitted.system, windows)[0], dof) if choice else None,
+        scope=f"{who}: rms of the whitened residual below {BAND:g} Hz",
+        p_value=gap.p,
+        p_value_after=choice.after[-1].p if choice else None,
+    )
+
+
+def _where(base: Base) -> list[Disagreement]:
+    """The channels and windows that disagree most."""
+    simulator = base.bench.simulator
+    known = missing_force.drivers(base.bench, base.around.track)
+    out = []
+    for i in base.bench.windows:
+        w, cells = simulator.windows[int(i)], base.system.cells[int(i)]
+        speed, yaw = (np.abs(known[int(i)][name]) for name in ("speed", "yaw_rate"))
+        regime = {
+            "speed": f"{speed.min():.1f}-{speed.max():.1f} m/s",
+            "yaw_rate": f"{yaw.min():.1f}-{yaw.max():.1f} rad/s",
+        }
+        out += [
+            Disagreement(
+                trial=simulator.study.runs[w.run].trial.name,
+                channel=channel,
+                window=(round(w.first, 3), round(w.last, 3)),
+                regime=regime,
+                statistic=float(cells.chi2[k] / cells.dof[k]),
+            )
+            for k, channel in enumerate(simulator.channels)
+            if cells.dof[k] >= 1.0
+        ]
+    return sorted(out, key=lambda entry: -entry.statistic)[:SHOWN]
+
+
+def missing(gap: Gap) -> list[MissingForce]:
+    """The forces that would close a gap and what they go with, strongest first."""
+    return [
+        MissingForce(force=group.force, goes_with=group.driver, sigmas=sigmas)
+        for group, sigmas in forces_left(gap)
+        if sigmas > LEFT
+    ][:FORCES]
+
+
+def _remarks(fitted: Fitted) -> list[str]:
+    """What the values of effects say in a sentence, of those that have one."""
+    out = []
+    for term in fitted.variant.terms:
+        std = {p.name: fitted.std.get(key, 0.0) for key, p in term.parameters}
+        if term.effect.remark is not None:
+            out.append(term.effect.remark(term.values, std))
+    return out
+
+
+def _notes(
+    base: Base, choice: Choice | None, closed: float, said: Verdict, left: list[MissingForce]
+) -> list[str]:
+    notes = list(base.bench.simulator.study.notes)
+    for channel, noise in base.bench.noise.items():
+        if noise.source != "study.toml":
+            notes.append(f"noise of {channel}: {noise.total:.3g} (SI), from {noise.source}")
+    notes += base.dropped
+    notes += choice.dropped if choice else []
+    notes += [
+        f"{name} stands at {bounded.WALL:g} standard deviations from what the study says of it: "
+        "something is missing there, or the study is wrong about it"
+        for name in (_walls(choice) if choice else [])
+    ]
+    if choice is not None and said in (Verdict.NAMED, Verdict.AMBIGUOUS):
+        notes += _remarks(choice.fitted)
+    if said != Verdict.UNKNOWN:
+        return notes
+    if choice is not None:
+        names = " and ".join(t.effect.key for t in choice.fitted.variant.terms)
+        notes.append(
+            f"nothing in the library explains the gap; the nearest, {names}, closes {closed:.0%}"
+        )
+    if any(force.goes_with.quantity == Quantity.STROKE for force in left[:TOP]):
+        notes.append(
+            "the missing force comes back with every stroke: chair and rider are not one rigid "
+            "body, and what of the rider moves, and how heavy it is, these channels do not tell"
+        )
+    return notes

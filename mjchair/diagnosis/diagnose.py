@@ -1,0 +1,85 @@
+"""From a study to a verdict: the stages one after another, each usable alone.
+
+In: a study or its folder. Out: a `Diagnosis`, and from it the corrected chair.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+import mujoco
+
+from mjchair.diagnosis.data.study import Study
+from mjchair.diagnosis.data.study_file import read_study
+from mjchair.diagnosis.decide import conclude
+from mjchair.diagnosis.explain.screening import Say, gap_after, prepare, screen_columns, silent
+from mjchair.diagnosis.explain.search import choose
+from mjchair.diagnosis.replay import strokes
+from mjchair.diagnosis.replay.cache import Store
+from mjchair.diagnosis.replay.engine_warnings import unheard
+from mjchair.diagnosis.replay.simulator import THREADS
+from mjchair.diagnosis.result import Diagnosis
+from mjchair.effects.effect import Effect
+from mjchair.effects.library import library
+
+
+def study_effects(study: Study, more: Sequence[Effect] = ()) -> list[Effect]:
+    """The effects that this study could show."""
+    columns = {name for run in study.runs for name in (*run.trial.other, *strokes.courses(run))}
+    driven = any(run.trial.inputs is not None for run in study.runs)
+    known = library(study.channels, columns, driven, study.spec)
+    possible = [
+        effect
+        for effect in known
+        if not (effect.outdoors and study.indoors)
+        and not (effect.commanded and study.torque_measured)
+    ]
+    return [*possible, *more]
+
+
+def diagnose(
+    study: Study | str | os.PathLike[str],
+    *,
+    effects: Sequence[Effect] = (),
+    say: Say = silent,
+    store: Store | None = None,
+    threads: int = THREADS,
+) -> Diagnosis:
+    """Find where model and measurement disagree, and name the effect that is missing.
+
+    Args:
+      study: a study, or its folder.
+      effects: of your own, besides the library's.
+      say: is called with the name of every stage as it begins.
+      store: keeps simulations, so that a second start goes on from an interrupted one.
+      threads: that simulate.
+
+    Raises:
+      MjchairError: a study that cannot be read or simulated, as one line.
+    """
+    known = study if isinstance(study, Study) else read_study(study)
+    # threads cost the linear algebra more than they bring on matrices this small
+    from threadpoolctl import threadpool_limits  # sets an environment variable when imported
+
+    with threadpool_limits(1, user_api="blas"), unheard():
+        bench, first = prepare(known, say, store, threads)
+        base = screen_columns(bench, first, study_effects(known, effects), say)
+        say("the gap")
+        gap = gap_after(base, base.plain)
+        say("effects, one and two at a time")
+        return conclude(base, gap, choose(base, gap, say) if gap.exists else None)
+
+
+def corrected(study: Study, diagnosis: Diagnosis) -> mujoco.MjSpec:
+    """The study's chair with the effects of the diagnosis in it.
+
+    What is only roughly known stands where the fit of these effects moved it, so that the chair
+    leaves the gap that the diagnosis says. Biases and scales of sensors are no chair's.
+    """
+    spec = study.spec.copy()
+    if diagnosis.correction is not None:
+        diagnosis.correction.edit_chair(spec)
+    for term in diagnosis.terms:
+        term.effect.apply(spec, term.values)
+    return spec

@@ -1,0 +1,64 @@
+"""The choice of effects that explains a study best: its fit, its rivals, and what it closes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain.column_ids import EffectGroup, ForceGroup
+from mjchair.diagnosis.explain.gap import Gap
+from mjchair.diagnosis.explain.hypotheses import Hypothesis
+from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis.fit.nonlinear import Fitted
+
+FURTHER = 3.5  # sigmas of a test whose statistic may count as left
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A hypothesis that the data do not rule out, and its fit."""
+
+    hypothesis: Hypothesis
+    fitted: Fitted
+
+
+@dataclass(kw_only=True)
+class Choice:
+    """What was chosen.
+
+    Attributes:
+      hypothesis: effects. fitted: their fit, everything made anew around it.
+      after: the gap that is left with one effect, with two, and so on; the last is the choice's.
+      rivals: for every effect, what could stand in its place, best first.
+      tried: every fit that was made.
+      dropped: a line for each hypothesis that this chair cannot have.
+    """
+
+    hypothesis: Hypothesis
+    fitted: Fitted
+    after: list[Gap]
+    rivals: list[list[Rival]]
+    tried: list[Rival] = field(default_factory=list)
+    dropped: list[str] = field(default_factory=list)
+
+
+def gain(base: Base, fitted: Fitted) -> float:
+    """Drop of chi2 that the effects bring."""
+    return base.plain.total - fitted.total
+
+
+def closure(gap: Gap, base: Base, fitted: Fitted, after: Gap) -> float:
+    """Share of the excess that a fit closes, 0 to 1; see `rules.closure`."""
+    further = [
+        t.statistic - t.dof
+        for t in after.tests
+        if isinstance(t.subject, EffectGroup | ForceGroup) and t.sigmas > FURTHER
+    ]
+    return rules.closure(
+        gained=gain(base, fitted),
+        left=max(further, default=0.0),
+        excess=gap.excess,
+        excess_std=gap.excess_std,
+        excess_after=after.excess,
+        excess_after_std=after.excess_std,
+    )

@@ -1,0 +1,161 @@
+"""The noise that a study shows once everything smooth is explained, known effect or not.
+
+In: a bench with first guesses of its sensors' noise, and answers to pulses of force. Out: the bench
+with the sensors' powers and the levels of what shakes the chair as the study shows them. Forces
+that go with speed, yaw rate, heading, a wheel's turn, a swivel, torque or strokes, and errors of
+one sensor, are fitted along, so that none of them passes for noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.diagnosis.data.own_resistance import own_resistance
+from mjchair.diagnosis.explain import missing_force
+from mjchair.diagnosis.explain.column_ids import EffectColumn, EffectGroup, ForceColumn, Quantity
+from mjchair.diagnosis.fit import noise_levels, process
+from mjchair.diagnosis.fit.bench import Bench
+from mjchair.diagnosis.fit.column_ids import ColumnId
+from mjchair.diagnosis.fit.noise_levels import Levels
+from mjchair.diagnosis.fit.process import Process
+from mjchair.diagnosis.replay import derivatives
+from mjchair.diagnosis.replay.derivatives import Column
+from mjchair.diagnosis.replay.noise import EDGES
+from mjchair.diagnosis.replay.pulses import Force, Pulse
+from mjchair.diagnosis.replay.simulator import WindowSimulator
+from mjchair.diagnosis.replay.window_states import Track
+from mjchair.effects.effect import SensorError
+from mjchair.measurement.sensors import sensor
+from mjchair.model.rolling import rear_axle
+
+Array = NDArray[np.float64]
+SPREAD = {Force.FORWARD: 10.0, Force.YAW: 3.0}  # N, N m: prior of a force that goes with something
+SCALE = 0.1  # prior of a sensor's scale, 1
+SHAKES = 0.3  # of the chair's own rolling resistance: what shakes it harder has a cause
+SIZES = 5.0  # sizes worth finding: prior of the best hypothesis
+
+
+def with_shown_noise(
+    bench: Bench,
+    first: Track,
+    nuisances: dict[ColumnId, Column],
+    pulses: Sequence[Pulse],
+    answers: Sequence[Array],
+) -> Bench:
+    """The bench with the least noise: what is left once everything smooth is explained."""
+    shaking = process.first(bench.simulator, first, pulses, answers)
+    given = noise_levels.known_parts(bench.simulator.study)
+    parts = {
+        part: np.full(level.size, given[part]) if part in given else level
+        for part, level in shaking.levels.items()
+    }
+    columns = {**nuisances, **_smooth(bench, first, pulses, answers), **_sensors(bench, first)}
+    return _estimated(bench, first, replace(shaking, levels=parts), columns)
+
+
+def with_noise_left_by(
+    bench: Bench, here: Track, nuisances: dict[ColumnId, Column], best: dict[ColumnId, Column]
+) -> Bench:
+    """The bench with the noise that the best hypothesis leaves.
+
+    Where few windows tell a smooth force, it takes a part of the noise for itself; what the best
+    effects do not explain, and what no force explains alike in all windows, is noise as well.
+
+    Args:
+      best: columns of the best hypothesis, in sizes worth finding.
+    """
+    assert bench.process is not None
+    broad = {key: [SIZES * window for window in column] for key, column in best.items()}
+    return _estimated(bench, here, bench.process, {**nuisances, **broad})
+
+
+def _estimated(
+    bench: Bench, here: Track, shaking: Process, columns: dict[ColumnId, Column]
+) -> Bench:
+    """The bench with the most probable levels, with the columns fitted along."""
+    simulator = bench.simulator
+    windows = noise_levels.windows_of(
+        simulator, here, bench.whitener, shaking, columns, bench.windows
+    )
+    begin = Levels(
+        parts=shaking.levels,
+        wobbles=shaking.wobbles,
+        bands=np.ones((len(simulator.channels), len(EDGES))),
+    )
+    least = noise_levels.least_powers(bench.noise, simulator.channels)
+    fixed = frozenset(noise_levels.known_parts(simulator.study))
+    most = _most(simulator)
+    shown = noise_levels.estimate(windows, begin, least, fixed, most=most)
+    shown = replace(shown, bands=shown.bands * _doubled(bench)[:, None])
+    noise = noise_levels.with_levels(bench.noise, simulator.channels, _steps(bench), shown)
+    return Bench(
+        simulator,
+        noise,
+        bench.nuisances,
+        replace(shaking, levels=shown.parts, wobbles=shown.wobbles),
+    )
+
+
+def _most(simulator: WindowSimulator) -> dict[Force, float]:
+    """The largest levels of what shakes a chair: shares of its own rolling resistance, N or N m."""
+    own = own_resistance(simulator.study.spec)
+    half = 0.5 * rear_axle(simulator.base).track
+    return {
+        Force.FORWARD: SHAKES * own,
+        Force.LEFTWARD: own,
+        Force.YAW: SHAKES * own * half,
+    }
+
+
+def _smooth(
+    bench: Bench, first: Track, pulses: Sequence[Pulse], answers: Sequence[Array]
+) -> dict[ColumnId, Column]:
+    """Forces that go with something other than the time, of one standard deviation."""
+    columns = missing_force.driver_columns(bench, first, pulses, answers)
+    return {
+        key: [SPREAD[key.group.force] * window for window in column]
+        for key, column in columns.items()
+        if isinstance(key, ForceColumn) and key.group.driver.quantity != Quantity.TIME
+    }
+
+
+def _sensors(bench: Bench, first: Track) -> dict[ColumnId, Column]:
+    """Bias and scale of every channel, of one standard deviation."""
+    out: dict[ColumnId, Column] = {}
+    for channel in bench.simulator.channels:
+        for kind, size in ((SensorError.BIAS, sensor(channel).fault), (SensorError.SCALE, SCALE)):
+            key = EffectColumn(EffectGroup(f"sensor_{kind}:{channel}", 0), 0)
+            out[key] = derivatives.sensor_column(bench.simulator, first, kind, channel, size)
+    return out
+
+
+def _doubled(bench: Bench) -> Array:
+    """2 for both channels of a copied pair, which tell together what one tells, (channels,)."""
+    study = bench.simulator.study
+    pairs = {*study.copied, *(_other(c) for c in study.copied)}
+    return np.array([2.0 if c in pairs else 1.0 for c in bench.simulator.channels])
+
+
+def _other(channel: str) -> str:
+    """The same channel of the other side."""
+    left, right = "left", "right"
+    if channel.startswith(left):
+        return right + channel.removeprefix(left)
+    return left + channel.removeprefix(right)
+
+
+def _steps(bench: Bench) -> Array:
+    """Median time between samples of every channel, s."""
+    out = []
+    for channel in bench.simulator.channels:
+        pieces = [
+            np.diff(run.trial.samples(channel)[0])
+            for run in bench.simulator.study.runs
+            if channel in run.trial.channels
+        ]
+        out.append(float(np.median(np.concatenate(pieces))))
+    return np.array(out)

@@ -1,0 +1,156 @@
+"""The chair as it was given, and every column around it: effects, forces, what is roughly known.
+
+In: a study and effects. Out: a `Base`, on which everything after it rests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mjchair.diagnosis.data import first_state, roughly_known
+from mjchair.diagnosis.data.study import Study, with_copied_wheels
+from mjchair.diagnosis.explain import candidates, hypotheses, missing_force, noise_shown
+from mjchair.diagnosis.explain import gap as gaps
+from mjchair.diagnosis.explain.candidates import Around, Start
+from mjchair.diagnosis.explain.column_ids import EffectColumn
+from mjchair.diagnosis.explain.gap import Gap
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.bench import Bench
+from mjchair.diagnosis.fit.bounded import Reduced
+from mjchair.diagnosis.fit.column_ids import ColumnId
+from mjchair.diagnosis.fit.nonlinear import Fitted, refit
+from mjchair.diagnosis.fit.parameter_columns import nuisance_columns
+from mjchair.diagnosis.fit.system import System
+from mjchair.diagnosis.fit.variant import Variant
+from mjchair.diagnosis.replay import noise, noise_left
+from mjchair.diagnosis.replay.cache import Store
+from mjchair.diagnosis.replay.derivatives import Column
+from mjchair.diagnosis.replay.pulses import pulse_answers, pulses
+from mjchair.diagnosis.replay.simulator import THREADS, WindowSimulator
+from mjchair.diagnosis.replay.window_states import Track, track
+from mjchair.effects.effect import Effect
+
+Say = Callable[[str], None]
+NEAR = 0.5  # prior standard deviations that columns of nuisances are good for
+SEEN = 10.0  # sigmas that one standard deviation of a nuisance changes
+FAR = 2.5  # prior standard deviations: a nuisance there is not what moved
+AT_REST = 0.01  # m/s^2, bias of an accelerometer that was seen at rest
+
+
+@dataclass(kw_only=True)
+class Base:
+    """A chair without any effect, and every column around it.
+
+    Attributes:
+      bench: with what. plain: the best such chair.
+      around: where effects are screened: that chair, or the chair as given.
+      nuisances: their columns. columns: of effects and forces. starts: what the effects' columns
+        mean. dropped: a line for each effect that could not be tried.
+      system, reduced: the linear algebra of them all.
+    """
+
+    bench: Bench
+    plain: Fitted
+    around: Around
+    nuisances: dict[ColumnId, Column]
+    columns: dict[ColumnId, Column]
+    starts: list[Start]
+    dropped: list[str]
+    system: System
+    reduced: Reduced
+
+
+def silent(_: str) -> None:
+    """Say nothing."""
+
+
+def prepare(
+    study: Study, say: Say = silent, store: Store | None = None, threads: int = THREADS
+) -> tuple[Bench, Track]:
+    """Windows, their states, the noise, and what is only roughly known."""
+    study = with_copied_wheels(study)
+    simulator = WindowSimulator(study, store=store, threads=threads)
+    known = noise.estimate(study)
+    say("states along the runs")
+    first = track(simulator, simulator.base, known)
+    given = dict(study.nuisance)
+    # at rest the accelerometer showed its bias
+    if any(first_state.stops(run) for run in study.runs):
+        given.setdefault("bias:imu_accelerometer.x", AT_REST)
+    nuisances = roughly_known.nuisances(study.channels, given)
+    return Bench(simulator, noise_left.refined(simulator, first, known), nuisances), first
+
+
+def screen_columns(
+    bench: Bench, first: Track, effects: Sequence[Effect], say: Say = silent
+) -> Base:
+    """Every column around a chair without effects, and the linear algebra of them all."""
+    simulator, variant, here = bench.simulator, Variant(bench.nuisances), first
+    say("what is only roughly known")
+    nuisances = nuisance_columns(bench, first, variant)
+    say("answers to forces")
+    asked = pulses(simulator)
+    answers = pulse_answers(simulator, first, asked, variant.edit)
+    say("the noise that the study shows")
+    bench = noise_shown.with_shown_noise(bench, first, nuisances, asked, answers)
+    plain = refit(bench, variant, first, nuisances)
+    if _farthest(plain) > NEAR:
+        plain = refit(bench, plain.variant, plain.track)
+    # a nuisance far from its prior stands in for something else: then the chair as given is nearer
+    if _farthest(plain) < FAR:
+        variant, here, nuisances = plain.variant, plain.track, plain.columns
+    around = Around(bench=bench, track=here, variant=variant, pulses=asked, answers=answers)
+    tried = candidates.collect(around, effects, lambda key: say(f"effect {key}"))
+    columns = tried.columns
+    columns.update(missing_force.driver_columns(bench, here, around.pulses, around.answers))
+    system = bench.system(here, {**nuisances, **columns}, len(nuisances), variant)
+    best = _best(bounded.reduce(system, bench.windows), tried.starts)
+    say("the noise that the best effects leave")
+    bench = noise_shown.with_noise_left_by(bench, here, nuisances, {c: columns[c] for c in best})
+    plain = refit(bench, plain.variant, plain.track, plain.columns)
+    system = bench.system(here, {**nuisances, **columns}, len(nuisances), variant)
+    return Base(
+        bench=bench,
+        plain=plain,
+        around=replace(around, bench=bench),
+        nuisances=nuisances,
+        columns=columns,
+        starts=tried.starts,
+        dropped=tried.dropped,
+        system=system,
+        reduced=bounded.reduce(system, bench.windows),
+    )
+
+
+def _best(reduced: Reduced, starts: Sequence[Start]) -> list[EffectColumn]:
+    """Columns of the best hypothesis of any size, by linear algebra."""
+    singles = hypotheses.singles(reduced, starts)
+    pairs = hypotheses.pairs(reduced, starts)
+    more = hypotheses.grown(reduced, starts, [h.starts for h in pairs[:3]]) if pairs else []
+    known = [h for h in (*singles[:1], *pairs[:1], *more[:1]) if h.score > 0.0]
+    return max(known, key=lambda h: h.score).columns if known else []
+
+
+def _farthest(plain: Fitted) -> float:
+    """The largest distance of a nuisance from its prior, of those that the data see."""
+    back = plain.system.back
+    seen = np.sqrt(np.diag(plain.system.G.sum(axis=0)))[: len(back)] > SEEN
+    return float(np.abs(back[seen]).max(initial=0.0))
+
+
+def gap_after(base: Base, fitted: Fitted) -> Gap:
+    """Test what a fit leaves, with its own parameters free."""
+    bench = base.bench
+    count = len(fitted.columns)
+    system = bench.system(
+        fitted.track,
+        {**fitted.columns, **base.columns},
+        count,
+        fitted.variant,
+        free=count - len(base.nuisances),
+    )
+    keys = [t.effect.key for t in fitted.variant.terms]
+    return gaps.test_gap(bench, system, bounded.reduce(system, bench.windows), keys)

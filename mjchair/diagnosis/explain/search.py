@@ -1,0 +1,323 @@
+"""Which effects: grown from one to as many as the data ask for, and held against rivals.
+
+In: the screened columns and the gap. Out: a `Choice`, or None where no effect brings anything. The
+rules that decide stand in rules.py; a hypothesis that this chair cannot have is dropped and noted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import hypotheses
+from mjchair.diagnosis.explain.candidates import Start
+from mjchair.diagnosis.explain.choice import Choice, Rival
+from mjchair.diagnosis.explain.gap import Gap
+from mjchair.diagnosis.explain.hypotheses import Hypothesis
+from mjchair.diagnosis.explain.left_out import held_out, with_terms
+from mjchair.diagnosis.explain.screening import Base, Say, gap_after
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.nonlinear import Fitted, refit
+from mjchair.errors import MjchairError
+
+TRIED = 3  # hypotheses of one size, where the first leaves a gap
+REFITTED = 5  # rivals of one effect
+
+
+@dataclass(frozen=True)
+class Tried(Rival):
+    """A hypothesis and its fit."""
+
+    @property
+    def price(self) -> float:
+        """Chi2 with the penalty of the parameters, less for effects that are common."""
+        penalty = rules.PENALTY * self.hypothesis.free - self.hypothesis.prior
+        return self.fitted.total + penalty
+
+
+def choose(base: Base, gap: Gap, say: Say) -> Choice | None:
+    """Grow from one effect to as many as the data ask for; None: no effect brings anything."""
+    search = Search(base, say)
+    options = [hypotheses.singles(base.reduced, base.starts)]
+    if not options[0] or options[0][0].score <= 0.0:
+        return None
+    options.append(hypotheses.pairs(base.reduced, base.starts))
+    best: Tried | None = None
+    after: list[Gap] = []
+    for size in range(1, rules.MOST + 1):
+        if size == rules.MOST:
+            bases = [h.starts for h in options[1][:3]]
+            options.append(hypotheses.grown(base.reduced, base.starts, bases))
+        if not options[size - 1] or options[size - 1][0].score <= 0.0:
+            break
+        top = search.best_of(options[size - 1])
+        if top is None:
+            continue
+        if best is not None and not _worth(base, best, top[0]):
+            break
+        best = top[0]
+        after.append(top[1])
+        if not after[-1].exists:
+            break
+    if best is None:
+        return None
+    best = search.without_needless(best)
+    rivals = search.rivals(best)
+    say("the last fit, with everything made anew around it")
+    fitted = search.anew(best.fitted)
+    after[-1] = gap_after(base, fitted)
+    return Choice(
+        hypothesis=best.hypothesis,
+        fitted=fitted,
+        after=after,
+        rivals=rivals,
+        tried=search.tried,
+        dropped=search.dropped,
+    )
+
+
+def _worth(base: Base, best: Tried, more: Tried) -> bool:
+    """Whether a larger hypothesis brings enough."""
+    held = held_out(base.bench, with_terms(best.fitted), with_terms(more.fitted))
+    return rules.worth_adding(
+        gained=best.fitted.total - more.fitted.total,
+        parameters=more.hypothesis.free - best.hypothesis.free,
+        held=float(held.sum()),
+    )
+
+
+class Search:
+    """Fits hypotheses, and notes those that cannot be.
+
+    Attributes:
+      base: around which. dropped: a line for each hypothesis that this chair cannot have.
+      tried: every fit that was made.
+    """
+
+    def __init__(self, base: Base, say: Say) -> None:
+        """Nothing is tried yet."""
+        self.base, self.say = base, say
+        self.dropped: list[str] = []
+        self.tried: list[Rival] = []
+
+    def best_of(self, options: Sequence[Hypothesis]) -> tuple[Tried, Gap] | None:
+        """The best hypothesis with its fit, and the gap that it leaves; None: none can be.
+
+        Where the first leaves a gap, the linear order may be wrong, and the next are fitted too.
+        """
+        first = _commonest(self.base, options)
+        top = self.believed(first)
+        if top is not None:
+            left = gap_after(self.base, top.fitted)
+            if not left.exists:
+                return top, left
+        near = [
+            h
+            for h in options
+            if h.keys != first.keys
+            and rules.worth_trying(score=h.score, best=first.score, gain=first.gain)
+        ]
+        tried = top
+        for other in near[: TRIED - 1]:
+            more = self.believed(other)
+            if more is not None and (top is None or more.price < top.price):
+                top = more
+        if top is None:
+            return None
+        return top, left if top is tried else gap_after(self.base, top.fitted)
+
+    def believed(self, hypothesis: Hypothesis) -> Tried | None:
+        """The fit, where every parameter is off its bounds and known better than beforehand."""
+        tried = self.fit(hypothesis)
+        if tried is None or _believable(tried.fitted):
+            return tried
+        self._note(
+            f"{' and '.join(hypothesis.keys)} is no answer: a number of it is not determined"
+        )
+        return None
+
+    def without_needless(self, tried: Tried) -> Tried:
+        """The hypothesis without the effects that it can do without."""
+        hypothesis, fitted = tried.hypothesis, tried.fitted
+        for start in hypothesis.starts if len(hypothesis.starts) > 1 else ():
+            rest = [s for s in hypothesis.starts if s is not start]
+            fewer = hypotheses.weigh(self.base.reduced, rest)
+            parameters = hypothesis.free - fewer.free
+            if rules.surely_needed(
+                sigmas=fitted.sigmas[start.effect.key],
+                lost=hypothesis.gain - fewer.gain,
+                parameters=parameters,
+            ):
+                continue
+            other = self.fit(fewer)
+            if other is None:
+                continue
+            lost = other.fitted.total - fitted.total
+            if rules.can_be_dropped(lost=lost, parameters=parameters):
+                return self.without_needless(other)
+        return tried
+
+    def rivals(self, chosen: Tried) -> list[list[Rival]]:
+        """For every effect of the choice: what could stand in its place, best first."""
+        hypothesis = chosen.hypothesis
+        out = []
+        for start in hypothesis.starts:
+            others = tuple(s for s in hypothesis.starts if s is not start)
+            near = [h for h in _replacements(self.base, start, others) if _close(hypothesis, h)]
+            tried = [self.fit(h) for h in near[:REFITTED]]
+            out.append(
+                [
+                    Rival(t.hypothesis, t.fitted)
+                    for t in tried
+                    if t is not None and _not_ruled_out(t, chosen)
+                ]
+            )
+        return out
+
+    def fit(self, hypothesis: Hypothesis) -> Tried | None:
+        """The nonlinear fit; from a second start where the first misses what was promised.
+
+        Returns:
+          None where this chair cannot have these effects; that is noted.
+        """
+        known = next((t for t in self.tried if t.hypothesis is hypothesis), None)
+        if known is not None:
+            return Tried(hypothesis, known.fitted)
+        self.say("fit of " + " and ".join(hypothesis.keys))
+        fitted = self._best_start(hypothesis)
+        if fitted is None:
+            return None
+        self.tried.append(Tried(hypothesis, fitted))
+        return Tried(hypothesis, fitted)
+
+    def _best_start(self, hypothesis: Hypothesis) -> Fitted | None:
+        """The better of two starts; of one, where it gets to what was promised."""
+        first = self._from(hypothesis, 1.0)
+        promised = self.base.reduced.total - hypothesis.gain
+        if first is not None and not rules.fell_short(
+            total=first.total, promised=promised, gain=hypothesis.gain
+        ):
+            return first
+        second = self._from(hypothesis, 0.5)
+        fits = [f for f in (first, second) if f is not None]
+        if len(fits) > 1 and rules.starts_disagree(fits[0].total, fits[1].total):
+            ends = " and ".join(f"{f.total:.0f}" for f in fits)
+            names = " and ".join(hypothesis.keys)
+            self._note(f"fits of {names} from two starts end at chi2 of {ends}; the less is used")
+        return min(fits, key=lambda f: f.total) if fits else None
+
+    def _note(self, line: str) -> None:
+        if line not in self.dropped:
+            self.dropped.append(line)
+
+    def _from(self, hypothesis: Hypothesis, share: float) -> Fitted | None:
+        """The fit that begins at a share of the linear fit's coefficients."""
+        base = self.base
+        terms = hypotheses.terms(base.reduced, hypothesis, share)
+        start = replace(base.around.variant, terms=terms)
+        try:
+            fitted = refit(base.bench, start, base.around.track, base.nuisances)
+        except (MjchairError, np.linalg.LinAlgError) as error:
+            self._note(f"{' and '.join(hypothesis.keys)} was not tried further: {error}")
+            return None
+        moves = any(term.effect.measured for term in terms)
+        walled = any(abs(by) >= bounded.WALL for by in fitted.variant.offsets.values())
+        if moves and walled:
+            fitted = self._around_terms(fitted)
+        if fitted.total > base.plain.total:
+            self._note(f"{' and '.join(hypothesis.keys)} fits worse than nothing and is left out")
+            return None
+        return fitted
+
+    def _around_terms(self, fitted: Fitted) -> Fitted:
+        """The fit from the effects that were reached, what is roughly known as given; the better.
+
+        A rider who moves changes how a chair answers to its centre of mass or its inertia. Columns
+        that were made without the rider then push these numbers to the ends of what they may be.
+        """
+        try:
+            start = replace(fitted.variant, offsets={})
+            again = refit(self.base.bench, start, fitted.track)
+        except (MjchairError, np.linalg.LinAlgError):
+            return fitted
+        return min(fitted, again, key=lambda f: f.total)
+
+    def anew(self, fitted: Fitted) -> Fitted:
+        """The fit with everything made anew around it; the fit itself where that cannot be."""
+        try:
+            return refit(self.base.bench, fitted.variant, fitted.track)
+        except (MjchairError, np.linalg.LinAlgError) as error:
+            self.dropped.append(f"the last fit was not made anew: {error}")
+            return fitted
+
+
+def _believable(fitted: Fitted) -> bool:
+    """Whether every size is off its bounds and known better than beforehand."""
+    sized = [(key, p) for term in fitted.variant.terms for key, p in term.parameters if p.sized]
+    return not fitted.at_bound and all(
+        rules.believable(std=fitted.std[key], change=p.change, width=p.high - p.low)
+        for key, p in sized
+    )
+
+
+def _commonest(base: Base, options: Sequence[Hypothesis]) -> Hypothesis:
+    """Of the hypotheses that fit alike, the one whose effects stand first in the library."""
+    order = {s.effect.key: k for k, s in reversed(list(enumerate(base.starts)))}
+    alike = [h for h in options if rules.alike(h.score, options[0].score)]
+    best = min(alike, key=lambda h: sorted(order[k] for k in h.keys))
+    for start in best.starts:
+        best = _freed(base, best, start)
+    return best
+
+
+def _freed(base: Base, hypothesis: Hypothesis, start: Start) -> Hypothesis:
+    """The hypothesis with more of an effect's parameters free, where others of them fit alike.
+
+    A left drive 3 % weak and a right one 3 % strong differ by what the mass may be: then neither
+    number alone has the uncertainty that it shows.
+    """
+    others = tuple(s for s in hypothesis.starts if s is not start)
+    same = [s for s in base.starts if s.group == start.group and s.effect.seeds is None]
+    weighed = {s.columns: hypotheses.weigh(base.reduced, (*others, s)) for s in same}
+    alike = {
+        column
+        for columns, h in weighed.items()
+        if len(columns) <= len(start.columns) and rules.alike(h.score, hypothesis.score)
+        for column in columns
+    }
+    richer = [c for c in weighed if alike <= set(c)]
+    return weighed[min(richer, key=len)] if len(alike) > len(start.columns) else hypothesis
+
+
+def _not_ruled_out(rival: Tried, chosen: Tried) -> bool:
+    """Whether the data leave a rival standing."""
+    return rules.stays_a_rival(
+        behind=rival.price - chosen.price,
+        errors=rules.paired_errors(rival.fitted.chi2, chosen.fitted.chi2),
+        beyond_bound=bool(rival.fitted.at_bound and not chosen.fitted.at_bound),
+    )
+
+
+def _replacements(base: Base, start: Start, others: tuple[Start, ...]) -> list[Hypothesis]:
+    """The others with another effect instead of `start`, best first."""
+    taken = {start.effect.key, *(s.effect.key for s in others)}
+    pool: dict[str, Hypothesis] = {}
+    for other in base.starts:
+        key = other.effect.key
+        if key in taken:
+            continue
+        replaced = hypotheses.weigh(base.reduced, (*others, other))
+        if not np.isfinite(replaced.score) or not hypotheses.physical(base.reduced, replaced):
+            continue
+        if key not in pool or replaced.score > pool[key].score:
+            pool[key] = replaced
+    return sorted(pool.values(), key=lambda h: -h.score)
+
+
+def _close(chosen: Hypothesis, other: Hypothesis) -> bool:
+    """Whether a rival is near enough, by linear algebra, to be fitted."""
+    behind = chosen.score - other.score
+    return rules.worth_refitting(behind=behind, gain=chosen.gain, rival_gain=other.gain)

@@ -1,0 +1,1 @@
+"""Fits: whitening of residuals, elimination of window states, least squares."""

@@ -1,0 +1,73 @@
+"""What every stage of a diagnosis works with: the simulator, the noise, what is roughly known.
+
+In: columns around a track. Out: the linear system of a variant of the chair.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.diagnosis.data.roughly_known import Nuisance
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.column_ids import ColumnId
+from mjchair.diagnosis.fit.process import Process
+from mjchair.diagnosis.fit.system import System, build
+from mjchair.diagnosis.fit.variant import Variant
+from mjchair.diagnosis.fit.whitening import Whitener
+from mjchair.diagnosis.replay.derivatives import Column
+from mjchair.diagnosis.replay.noise import Noise
+from mjchair.diagnosis.replay.simulator import WindowSimulator
+from mjchair.diagnosis.replay.window_states import Track
+
+
+@dataclass
+class Bench:
+    """What every stage works with.
+
+    Attributes:
+      simulator: of the windows. noise: of the channels. nuisances: of the study.
+      process: what shakes the chair in the windows; None: nothing.
+    """
+
+    simulator: WindowSimulator
+    noise: dict[str, Noise]
+    nuisances: tuple[Nuisance, ...]
+    process: Process | None = None
+
+    @cached_property
+    def whitener(self) -> Whitener:
+        """Of the noise."""
+        return Whitener(self.simulator, self.noise)
+
+    @cached_property
+    def windows(self) -> NDArray[np.int64]:
+        """Indices of the windows that may be fitted to."""
+        fitted = set(self.simulator.study.fitted)
+        return np.array([i for i, w in enumerate(self.simulator.windows) if w.run in fitted])
+
+    def system(
+        self,
+        track: Track,
+        columns: Mapping[ColumnId, Column],
+        nuisance: int,
+        variant: Variant,
+        free: int = 0,
+    ) -> System:
+        """The linear system around a track of a variant; see `system.build`."""
+        system = build(
+            self.simulator,
+            track,
+            self.whitener,
+            columns,
+            nuisance=nuisance,
+            offsets=variant.offsets,
+            free=free,
+            process=self.process,
+        )
+        system.set_cells(bounded.solve(system, self.windows, [])[0][:nuisance])
+        return system

@@ -1,0 +1,323 @@
+"""The noise that a study itself shows: levels of what shakes the chair, and powers of its sensors.
+
+In: windows as white columns with first guesses of every level. Out: the levels at which the data
+are most probable (restricted maximum likelihood: what is asked about is fitted along and priced).
+Nothing here knows an effect: forces that depend smoothly on speed, yaw rate, heading and so on are
+eliminated first, so a level is what nothing smooth explains.
+
+A level is moved by the ratio of what the residual shows of it to what it should show (Zhou, Hu,
+Qiao and Cho 2019, "MM algorithms for variance components models", of which this is the step).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from mjchair.diagnosis.data.study import Study
+from mjchair.diagnosis.fit.column_ids import ColumnId
+from mjchair.diagnosis.fit.elimination import state_columns
+from mjchair.diagnosis.fit.process import KINDS, Part, Process
+from mjchair.diagnosis.fit.whitening import Whitener
+from mjchair.diagnosis.replay.derivatives import Column
+from mjchair.diagnosis.replay.noise import EDGES, Noise
+from mjchair.diagnosis.replay.pulses import Force
+from mjchair.diagnosis.replay.sampling import residual
+from mjchair.diagnosis.replay.simulator import WindowSimulator
+from mjchair.diagnosis.replay.window_states import Track
+from mjchair.measurement.sensors import sensor
+
+Array = NDArray[np.float64]
+STEPS = 15
+LEAST_HZ = 1.5  # below it a chair's effects show, so a sensor's power there is that of just above
+FAR = 4.0  # ratio of a run's level (as power) to the median run's: beyond is an event, no level
+FLAT = 4.0  # power of a sensor in its slowest band over that in the next, at most
+OWN = 6.0  # numbers that tell a run's level as well as all other runs together do
+FORCES = {"drive": Force.FORWARD, "side": Force.LEFTWARD, "yaw": Force.YAW}  # as in study.toml
+
+
+@dataclass(frozen=True, kw_only=True)
+class Levels:
+    """What is estimated.
+
+    Attributes:
+      parts: part -> (runs,) standard deviations, N or N m. wobbles: channel -> amplitude, SI.
+      bands: (channels, bands) power over that of the first guess.
+    """
+
+    parts: Mapping[Part, Array]
+    wobbles: Mapping[int, float]
+    bands: Array
+
+
+@dataclass(frozen=True)
+class WindowColumns:
+    """One window, white by the first guess of the noise.
+
+    Attributes:
+      run: index. r: (n,). J: (n, p). Z: (n, k), with standard deviations of their prior put in.
+      pulses: force -> white answers (n, m), and correlations of every part (m, m).
+      wobbles: channel -> (n, 2). band: (n,) index of each row's band. channel: (n,).
+      tells: (n,) whether a row tells its band's power.
+    """
+
+    run: int
+    r: Array
+    J: Array
+    Z: Array
+    pulses: Mapping[Force, Array]
+    correlations: Mapping[Part, Array]
+    wobbles: Mapping[int, Array]
+    band: NDArray[np.int64]
+    channel: NDArray[np.int64]
+    tells: NDArray[np.bool_]
+
+
+def windows_of(
+    simulator: WindowSimulator,
+    track: Track,
+    whitener: Whitener,
+    process: Process,
+    columns: Mapping[ColumnId, Column],
+    which: Sequence[int] | NDArray[np.int64],
+) -> list[WindowColumns]:
+    """The windows `which` with columns (ids -> (rows, channels) a window), each of unit prior."""
+    out = []
+    for i in (int(w) for w in which):
+        miss = residual(
+            simulator.measured(simulator.windows[i]), track.predicted[i], simulator.channels
+        )
+        stacked = np.stack([c[i] for c in columns.values()], axis=2)
+        free, precision = state_columns(simulator, track, i)
+        both = np.concatenate([miss[:, :, None], stacked, free], axis=2)
+        white = whitener(i, np.nan_to_num(both, copy=False, posinf=0.0, neginf=0.0))
+        p = stacked.shape[2]
+        members = {f: process.members(i, f) for f in FORCES.values()}
+        frequency = whitener.frequency[i]
+        out.append(
+            WindowColumns(
+                run=int(process.runs[i]),
+                r=white[:, 0],
+                J=white[:, 1 : 1 + p],
+                Z=white[:, 1 + p :] / np.sqrt(precision),
+                pulses={f: process.answers_of(i, m, whitener) for f, m in members.items()},
+                correlations={
+                    part: process.correlation(members[kind.force], part)
+                    for part, kind in KINDS.items()
+                },
+                wobbles={c: process.wobble_columns(i, c, whitener) for c in process.encoders},
+                band=np.minimum(np.searchsorted(EDGES, frequency, side="right"), len(EDGES) - 1),
+                channel=whitener.channel[i],
+                tells=frequency > LEAST_HZ,
+            )
+        )
+    return out
+
+
+BANDS = "bands"
+
+
+@dataclass
+class Seen:
+    """What the residual shows of every level (`shown`), and what it should show (`due`).
+
+    Keys are parts, channels with a wobble, and BANDS.
+    """
+
+    shown: dict[object, Array] = field(default_factory=dict)
+    due: dict[object, Array] = field(default_factory=dict)
+
+    def add(self, key: object, at: int, size: int, shown: float, due: float) -> None:
+        """Add one window's part at a place of an array of this size."""
+        for table, value in ((self.shown, shown), (self.due, due)):
+            table.setdefault(key, np.zeros(size))[at] += value
+
+    def add_rows(self, w: WindowColumns, shown: Array, due: Array, size: int) -> None:
+        """Add the rows (n,) of one window to the bands of their channels."""
+        at = (w.channel * len(EDGES) + w.band)[w.tells]
+        for table, values in ((self.shown, shown), (self.due, due)):
+            known = table.setdefault(BANDS, np.zeros(size))
+            known += np.bincount(at, values[w.tells], minlength=size)
+
+
+def estimate(
+    windows: Sequence[WindowColumns],
+    first: Levels,
+    least: Array,
+    fixed: frozenset[Part] = frozenset(),
+    steps: int = STEPS,
+    most: Mapping[Force, float] | None = None,
+) -> Levels:
+    """The most probable levels.
+
+    Args:
+      windows: that may be fitted to. first: where to begin.
+      least: (channels,), the least power of a sensor, over that of the first guess.
+      fixed: parts whose level is known. most: force -> the largest level of a part of it, N or
+        N m; None: any. What shakes a chair harder is something missing.
+    """
+    levels = first
+    for _ in range(steps):
+        levels = _within(
+            _moved(levels, _looked_at(windows, levels), least, fixed), most or {}, fixed
+        )
+    return levels
+
+
+def _within(levels: Levels, most: Mapping[Force, float], fixed: frozenset[Part]) -> Levels:
+    """The levels, none larger than what noise can be."""
+    parts = {
+        part: level if part in fixed else np.minimum(level, most.get(KINDS[part].force, np.inf))
+        for part, level in levels.parts.items()
+    }
+    bands = levels.bands.copy()
+    bands[:, 0] = np.minimum(bands[:, 0], FLAT * bands[:, 1])
+    return replace(levels, parts=parts, bands=bands)
+
+
+def _looked_at(windows: Sequence[WindowColumns], levels: Levels) -> Seen:
+    """One look at the residual with all levels as they are."""
+    count = windows[0].J.shape[1]
+    A, a = np.eye(count), np.zeros(count)
+    kept = []
+    for w in windows:
+        size = 1.0 / np.sqrt(levels.bands[w.channel, w.band])
+        columns = _noise_columns(w, levels) * size[:, None]
+        factor = cho_factor(np.eye(columns.shape[1]) + columns.T @ columns)
+        J, r = w.J * size[:, None], w.r * size
+        H = J - columns @ cho_solve(factor, columns.T @ J)
+        A += J.T @ H
+        a += H.T @ r
+        kept.append((w, size, columns, factor, J, r, H))
+    inverse = np.linalg.inv(A)
+    best = inverse @ a
+    seen = Seen()
+    runs = 1 + max(w.run for w in windows)
+    for w, size, columns, factor, J, r, H in kept:
+        left = r - J @ best
+        left = left - columns @ cho_solve(factor, columns.T @ left)
+        lean = H @ inverse
+        half = cho_solve(factor, columns.T)
+        diagonal = 1.0 - np.einsum("ij,ji->i", columns, half) - np.einsum("ij,ij->i", lean, H)
+        seen.add_rows(w, left**2, diagonal, levels.bands.size)
+        for force, answers in w.pulses.items():
+            P = answers * size[:, None]
+            q, M = P.T @ left, _precision(P, columns, half, H, lean)
+            for part, kind in KINDS.items():
+                if kind.force == force:
+                    K = w.correlations[part]
+                    seen.add(part, w.run, runs, q @ K @ q, float((K * M).sum()))
+        for channel, pair in w.wobbles.items():
+            P = pair * size[:, None]
+            q, M = P.T @ left, _precision(P, columns, half, H, lean)
+            seen.add(channel, 0, 1, float(q @ q), float(np.trace(M)))
+    return seen
+
+
+def _precision(P: Array, columns: Array, half: Array, H: Array, lean: Array) -> Array:
+    """P' Q P of columns P: Q is what the data tell once all that is asked about is fitted."""
+    PH = P.T @ H
+    return np.asarray(P.T @ P - (P.T @ columns) @ (half @ P) - (P.T @ lean) @ PH.T)
+
+
+def _noise_columns(w: WindowColumns, levels: Levels) -> Array:
+    """Columns (n, k) of one standard deviation of all that a window is free in."""
+    out = [w.Z]
+    for force, answers in w.pulses.items():
+        parts = [p for p, kind in KINDS.items() if kind.force == force]
+        cover = sum(
+            (float(levels.parts[p][w.run]) ** 2 * w.correlations[p] for p in parts),
+            np.zeros((answers.shape[1],) * 2),
+        )
+        small = 1e-9 * max(float(np.trace(cover)), 1e-12)
+        out.append(answers @ np.linalg.cholesky(cover + small * np.eye(len(cover))))
+    out += [size * w.wobbles[c] for c, size in levels.wobbles.items() if size > 0.0]
+    return np.hstack(out)
+
+
+def _moved(levels: Levels, seen: Seen, least: Array, fixed: frozenset[Part]) -> Levels:
+    """The levels one step on."""
+    parts = {
+        part: level if part in fixed else _of_runs(level, seen.shown[part], seen.due[part])
+        for part, level in levels.parts.items()
+    }
+    wobbles = {
+        c: size * _ratio(seen.shown[c], seen.due[c])[0] ** 0.5 for c, size in levels.wobbles.items()
+    }
+    shape = levels.bands.shape
+    ratio = _ratio(seen.shown[BANDS], seen.due[BANDS]).reshape(shape)
+    told = seen.due[BANDS].reshape(shape) > 1.0
+    bands = np.where(told, levels.bands * ratio, levels.bands)
+    return Levels(parts=parts, wobbles=wobbles, bands=np.maximum(bands, least[:, None]))
+
+
+def _of_runs(level: Array, shown: Array, due: Array) -> Array:
+    """A part's level in every run (runs,): its own as far as the run tells it, else the common."""
+    there = np.flatnonzero(due > 1e-12)
+    if not there.size:
+        return level
+    power = level[there] ** 2
+    ratio = _ratio(shown[there], due[there])
+    told = power * due[there]  # about as many numbers tell it
+    ceiling = FAR * float(np.median(ratio * power))
+    own = np.minimum(ratio * power, max(ceiling, 1e-12))
+    common = float((own * told).sum() / max(told.sum(), 1e-12)) if told.sum() > 0.0 else own.mean()
+    share = told / (told + OWN)
+    out = np.full(level.size, np.sqrt(max(common, 1e-12)))
+    out[there] = np.sqrt(np.maximum(own, 1e-12)) ** share * np.sqrt(max(common, 1e-12)) ** (
+        1.0 - share
+    )
+    return out
+
+
+def _ratio(shown: Array, due: Array) -> Array:
+    return np.clip(shown / np.maximum(due, 1e-12), 1e-3, 1e3)
+
+
+def with_levels(
+    noise: Mapping[str, Noise], channels: Sequence[str], steps: Array, levels: Levels
+) -> dict[str, Noise]:
+    """The noise of every channel with the powers that were estimated.
+
+    Args:
+      steps: (channels,), s between samples.
+    """
+    edges = np.r_[0.0, EDGES]
+    out = {}
+    for channel, step, ratio in zip(channels, steps, levels.bands, strict=True):
+        known = noise[channel]
+        middle = 0.5 * (edges[:-1] + edges[1:])
+        power = known.power(middle, float(step)) * ratio
+        # the share of each band in the variance of the samples
+        width = np.diff(edges) * 2.0 * float(step)
+        more = float((np.maximum(power - known.white**2, 0.0) * np.minimum(width, 1.0)).sum())
+        slow = max(float(np.sqrt(more)), 0.0)
+        out[channel] = replace(known, slow=slow, bands=tuple(float(p) for p in power))
+    return out
+
+
+def least_powers(noise: Mapping[str, Noise], channels: Sequence[str]) -> Array:
+    """The least power of each sensor, over that of the first guess, (channels,).
+
+    What study.toml gives is not made smaller; no sensor is better than its kind can be.
+    """
+    out = []
+    for c in channels:
+        given = noise[c].source == "study.toml"
+        out.append(1.0 if given else min(1.0, (sensor(c).floor / noise[c].total) ** 2))
+    return np.array(out)
+
+
+def known_parts(study: Study) -> dict[Part, float]:
+    """Levels of parts that study.toml gives, N or N m: half of a force's power is slow."""
+    out = {}
+    for name, force in FORCES.items():
+        given = study.process.get(name)
+        if given is not None:
+            parts = [p for p, kind in KINDS.items() if kind.force == force]
+            out.update({p: given / len(parts) ** 0.5 for p in parts})
+    return out

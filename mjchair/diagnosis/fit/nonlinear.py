@@ -1,0 +1,204 @@
+"""The nonlinear fit of a variant of the chair: Gauss-Newton within walls and bounds.
+
+In: a variant to begin at. Out: the best one found, with its track, the linear system around it and
+its uncertainties. A fit never returns a variant that is worse than the one that it began at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.bench import Bench
+from mjchair.diagnosis.fit.column_ids import ColumnId, ParameterId, RoughlyKnown
+from mjchair.diagnosis.fit.parameter_columns import nuisance_columns, term_columns
+from mjchair.diagnosis.fit.system import System
+from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.diagnosis.replay.derivatives import Column
+from mjchair.diagnosis.replay.window_states import Track, track
+from mjchair.effects.effect import Parameter, clip
+from mjchair.errors import MjchairError
+
+Array = NDArray[np.float64]
+ROUNDS = 12  # at most, of Gauss-Newton
+HALVED = 5  # steps in a row that fail, each half of the one before, until none is believed
+DONE = 1.0  # chi2 that a further round must promise
+
+
+@dataclass(kw_only=True)
+class Fitted:
+    """A variant that was fitted, with its track and the linear system around it.
+
+    Attributes:
+      variant, track: where the system is linear. columns: of nuisances and terms.
+      system: nuisances first, then a column a free parameter.
+      step: (p,) of the coefficients that stand in no variant, such as sensor biases; zero
+        elsewhere.
+      chi2: of the windows fitted to, with that step put in. total: their sum, with priors.
+      promised: total after one more linear step. std: parameter -> standard deviation, SI.
+      sigmas: effect key -> how far its parameters together are from neutral, in standard errors.
+      at_bound: parameters that ended on a bound.
+    """
+
+    variant: Variant
+    track: Track
+    columns: dict[ColumnId, Column]
+    system: System
+    step: Array
+    chi2: Array
+    total: float
+    promised: float
+    std: dict[ParameterId, float]
+    sigmas: dict[str, float]
+    at_bound: tuple[ParameterId, ...]
+
+
+def refit(
+    bench: Bench,
+    start: Variant,
+    before: Track | None,
+    nuisances: dict[ColumnId, Column] | None = None,
+    rounds: int = ROUNDS,
+) -> Fitted:
+    """Nonlinear fit of nuisances and effects within bounds: Gauss-Newton, steps halved that fail.
+
+    Args:
+      start: where to begin. before: a track of a chair that is not far.
+      nuisances: columns to use throughout, with the answers to the slow state of `before`; None:
+        both are made anew at `start`. The residual, which decides where the fit ends, is always
+        new.
+
+    Raises:
+      MjchairError: `start` is no chair that can be: it does not compile, or its simulation fails.
+    """
+    simulator = bench.simulator
+    if nuisances is None:
+        model, errors = simulator.compile(start.edit), start.sensor_errors(simulator.channels)
+        before = track(simulator, model, bench.noise, errors, before, anew=True)
+        nuisances = nuisance_columns(bench, before, start)
+    best = _around(bench, start, before, nuisances)
+    variant = _after_linear_step(bench, best)
+    failed = 0
+    for _ in range(rounds):
+        if best.total - best.promised < DONE or failed == HALVED:
+            break
+        try:
+            here = _around(bench, variant, best.track, nuisances)
+        except (MjchairError, np.linalg.LinAlgError):  # of a step to what no chair can be
+            failed, variant = failed + 1, _between(best.variant, variant)
+            continue
+        if here.total < best.total:
+            failed, best, variant = 0, here, _after_linear_step(bench, here)
+        else:  # a step too far
+            failed, variant = failed + 1, _between(best.variant, variant)
+    return best
+
+
+def _around(
+    bench: Bench, variant: Variant, before: Track | None, nuisances: dict[ColumnId, Column]
+) -> Fitted:
+    """A variant as it is, and the linear system around it.
+
+    Raises:
+      MjchairError: it does not compile, or its simulation fails.
+    """
+    simulator = bench.simulator
+    errors = variant.sensor_errors(simulator.channels)
+    model = simulator.compile(variant.edit)
+    here = track(simulator, model, bench.noise, errors, before)
+    columns = dict(nuisances)
+    count = len(columns)
+    columns.update(term_columns(bench, here, variant))
+    _check_finite([here.predicted, *columns.values()], variant)
+    system = bench.system(here, columns, count, variant)
+    step, total = bounded.solve_nuisances(system, bench.windows, _outside(bench, system, count))
+    system.set_cells(step[:count])  # of this very variant: nothing else of it is moved
+    covariance = bounded.covariance(system, bench.windows)
+    std, bound = {}, []
+    for term in variant.terms:
+        for key, p in term.parameters:
+            k = system.places[key]
+            std[key] = float(np.sqrt(max(covariance[k, k], 0.0))) * p.change
+            if _on_bound(p, term.values[p.name]):
+                bound.append(key)
+    terms = range(count, len(system.columns))
+    return Fitted(
+        variant=variant,
+        track=here,
+        columns=columns,
+        system=system,
+        step=step,
+        chi2=np.array([bounded.chi2(system, i, step) for i in bench.windows]),
+        total=total,
+        promised=bounded.solve(system, bench.windows, terms)[1],
+        std=std,
+        sigmas={t.effect.key: _sigmas(t, system, covariance) for t in variant.terms},
+        at_bound=tuple(bound),
+    )
+
+
+def _check_finite(columns: Sequence[Column], variant: Variant) -> None:
+    """Refuse a variant whose simulation fails."""
+    if not all(np.isfinite(window).all() for column in columns for window in column):
+        keys = " and ".join(t.effect.key for t in variant.terms) or "no effect"
+        raise MjchairError(f"the chair with {keys} does not simulate: a prediction is not finite")
+
+
+def _outside(bench: Bench, system: System, count: int) -> list[int]:
+    """Places of the nuisances that stand in no variant, such as sensor biases."""
+    inside = {RoughlyKnown(n.name) for n in bench.nuisances if n.edit is not None}
+    return [i for i, column in enumerate(system.columns[:count]) if column not in inside]
+
+
+def _on_bound(p: Parameter, value: float) -> bool:
+    """Whether the size of an effect ended on a bound that is not where the effect is not there."""
+    return p.sized and value in (p.low, p.high) and not p.low == p.neutral == value
+
+
+def _between(one: Variant, other: Variant) -> Variant:
+    """Half way from one variant to another of the same terms."""
+    offsets = {n: 0.5 * (one.offsets.get(n, 0.0) + v) for n, v in other.offsets.items()}
+    terms = tuple(
+        replace(a, values={n: 0.5 * (v + b.values[n]) for n, v in a.values.items()})
+        for a, b in zip(one.terms, other.terms, strict=True)
+    )
+    return replace(one, offsets=offsets, terms=terms)
+
+
+def _sigmas(term: Term, system: System, covariance: Array) -> float:
+    """Significance of an effect's size: of its parameters together, times and places aside."""
+    sized = [(key, p) for key, p in term.parameters if p.sized]
+    if not sized:
+        return 0.0
+    at = system.index([key for key, _ in sized])
+    away = np.array([(term.values[p.name] - p.neutral) / p.change for _, p in sized])
+    return float(np.sqrt(away @ np.linalg.solve(covariance[np.ix_(at, at)], away)))
+
+
+def _after_linear_step(bench: Bench, fitted: Fitted) -> Variant:
+    """The variant after the linear step, within walls and bounds."""
+    terms = range(fitted.system.nuisance, len(fitted.system.columns))
+    step, _ = bounded.solve(fitted.system, bench.windows, terms)
+    return moved(fitted.variant, fitted.system, step)
+
+
+def moved(variant: Variant, system: System, step: Array) -> Variant:
+    """The variant after a step (p,) of the system's coefficients, within walls and bounds."""
+    offsets = dict(variant.offsets)
+    for n in variant.nuisances:
+        if n.edit is not None:
+            by = step[system.places[RoughlyKnown(n.name)]]
+            there = offsets.get(n.name, 0.0) + by
+            offsets[n.name] = float(np.clip(there, -bounded.WALL, bounded.WALL))
+    terms = []
+    for term in variant.terms:
+        values = dict(term.values)
+        for key, p in term.parameters:
+            by = float(step[system.places[key]]) * p.change
+            values[p.name] = clip(p, values[p.name] + float(np.clip(by, -p.cautious, p.cautious)))
+        terms.append(replace(term, values=values))
+    return replace(variant, offsets=offsets, terms=tuple(terms))

@@ -1,0 +1,76 @@
+"""The columns of a fit: how every prediction answers to nuisances and to parameters of effects.
+
+In: a variant of the chair and its track. Out: columns, in prior standard deviations or typical
+changes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mjchair.diagnosis.fit.bench import Bench
+from mjchair.diagnosis.fit.column_ids import ColumnId, ParameterId, RoughlyKnown
+from mjchair.diagnosis.fit.variant import Variant, nudged
+from mjchair.diagnosis.replay import derivatives
+from mjchair.diagnosis.replay.derivatives import Column, Point
+from mjchair.diagnosis.replay.window_states import Track
+
+FINER = 1.5  # difference of two step sizes to that of this step to none, with a margin
+
+
+def nuisance_columns(bench: Bench, track: Track, variant: Variant) -> dict[ColumnId, Column]:
+    """Columns of all nuisances and of the differences to a finer simulation."""
+    simulator = bench.simulator
+    mechanical = [n for n in bench.nuisances if n.edit is not None]
+    points = [
+        *derivatives.nuisance_points(mechanical),
+        Point(derivatives.half_step, FINER, fine=True),
+        Point(derivatives.other_integrator, FINER, fine=True),
+    ]
+    errors = variant.sensor_errors(simulator.channels)
+    columns = derivatives.differences(simulator, track, points, variant.edit, errors)
+    names = [*(n.name for n in mechanical), "half_step", "integrator"]
+    out: dict[ColumnId, Column] = {
+        RoughlyKnown(name): column for name, column in zip(names, columns, strict=True)
+    }
+    late = simulator.input_step() / np.sqrt(12.0)
+    if late > 0.0 and track.coarse is not None:
+        # a torque that changes between two samples changes anywhere between them
+        model = simulator.compile(variant.edit, coarse=True)
+        shifted = derivatives.predictions(simulator, track, model, errors, late)
+        out[RoughlyKnown("input_timing")] = [
+            a - b for a, b in zip(shifted, track.coarse, strict=True)
+        ]
+    for n in bench.nuisances:
+        if n.edit is None:
+            out[RoughlyKnown(n.name)] = derivatives.sensor_column(
+                simulator, track, n.error, n.channel, n.std
+            )
+    return out
+
+
+def term_columns(bench: Bench, track: Track, variant: Variant) -> dict[ColumnId, Column]:
+    """One column a free parameter of the variant's effects, in units of its typical change."""
+    simulator = bench.simulator
+    errors = variant.sensor_errors(simulator.channels)
+    out: dict[ColumnId, Column] = {}
+    points: dict[ParameterId, Point] = {}
+    for term in variant.terms:
+        for key, parameter in term.parameters:
+            effect = term.effect
+            if effect.sensor is not None:
+                out[key] = derivatives.sensor_column(
+                    simulator, track, effect.sensor, str(effect.channel), parameter.change
+                )
+                continue
+            beside, factor = nudged(variant, term, parameter)
+            points[key] = Point(beside.edit, factor)
+    if points:
+        # a point here is a whole chair, so nothing comes before its edit
+        model = simulator.compile(variant.edit, coarse=True)
+        base = derivatives.predictions(simulator, track, model, errors)
+        for key, point in points.items():
+            model = simulator.compile(point.edit, coarse=True)
+            edited = derivatives.predictions(simulator, track, model, errors)
+            out[key] = [point.factor * (e - y) for e, y in zip(edited, base, strict=True)]
+    return {key: out[key] for term in variant.terms for key, _ in term.parameters}

@@ -1,0 +1,121 @@
+"""All windows as linear algebra around one chair: products of white columns, window by window.
+
+What is left of a window is small: the products of its columns with one another and with the
+residual. Every test, fit and score after that is made of sums of those (bounded.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.diagnosis.fit.column_ids import ColumnId, RoughlyKnown
+from mjchair.diagnosis.fit.elimination import eliminate_window
+from mjchair.diagnosis.fit.process import Process
+from mjchair.diagnosis.fit.slow_part import BAND, Cells, cells, slow_components
+from mjchair.diagnosis.fit.whitening import Whitener
+from mjchair.diagnosis.replay.derivatives import Column
+from mjchair.diagnosis.replay.sampling import residual
+from mjchair.diagnosis.replay.simulator import WindowSimulator
+from mjchair.diagnosis.replay.window_states import Track
+
+Array = NDArray[np.float64]
+SEEN = 1e-4  # share of a column that must survive the elimination
+
+
+@dataclass(kw_only=True, eq=False)
+class System:
+    """Products of white columns, window by window.
+
+    Attributes:
+      columns: p of them. nuisance: how many, at the start, are nuisances with unit prior.
+      free: how many of those, the last, are effects that are in, without prior.
+      G: (windows, p, p). b: (windows, p). c: (windows,) chi2 of the residual.
+      run: (windows,) index of the run. back: (nuisance,) where the model already stands from the
+        centre of its priors, in standard deviations.
+      slow: slow components of the windows. cells: slow parts, with the best nuisances put in.
+    """
+
+    columns: list[ColumnId]
+    nuisance: int
+    free: int = 0
+    G: Array
+    b: Array
+    c: Array
+    run: NDArray[np.int64]
+    back: Array
+    slow: list[list[Array]] = field(default_factory=list)
+    cells: list[Cells] = field(default_factory=list)
+
+    @cached_property
+    def places(self) -> dict[ColumnId, int]:
+        """Place of every column."""
+        return {c: i for i, c in enumerate(self.columns)}
+
+    def set_cells(self, step: Array) -> None:
+        """Take the slow parts with the nuisances at `step` (nuisances,)."""
+        self.cells = [cells(components, step) for components in self.slow]
+
+    def index(self, columns: Sequence[ColumnId]) -> list[int]:
+        """Places of columns."""
+        return [self.places[c] for c in columns]
+
+
+def build(
+    simulator: WindowSimulator,
+    track: Track,
+    whitener: Whitener,
+    columns: Mapping[ColumnId, Column],
+    *,
+    nuisance: int,
+    offsets: Mapping[str, float],
+    free: int = 0,
+    process: Process | None = None,
+) -> System:
+    """Eliminate every window's state and disturbances and form the products.
+
+    Args:
+      columns: (rows, channels) a window; nuisances first, scaled by their priors.
+      nuisance: how many are. offsets: where nuisances already are, in standard deviations.
+      free: how many of the nuisances, the last, are effects that are in.
+      process: what shakes the chair; None: nothing.
+
+    Returns:
+      The system without cells.
+    """
+    ids = list(columns)
+    p, count = len(ids), len(simulator.windows)
+    G, b, c = np.zeros((count, p, p)), np.zeros((count, p)), np.zeros(count)
+    slow = []
+    raw = np.zeros(p)
+    for i, w in enumerate(simulator.windows):
+        miss = residual(simulator.measured(w), track.predicted[i], simulator.channels)
+        stacked = np.stack([columns[n][i] for n in ids], axis=2)
+        window = eliminate_window(simulator, track, whitener, i, miss, stacked, process)
+        G[i], b[i], c[i] = window.G, window.b, window.chi2
+        raw += (window.J * window.J).sum(axis=0)
+        slow.append(slow_components(window, nuisance, whitener.slow(i, BAND)))
+    # what a free initial state takes away whole is nothing but rounding afterwards
+    hidden = G.sum(axis=0).diagonal() < SEEN * raw
+    hidden[:nuisance] = False
+    G[:, hidden, :], G[:, :, hidden], b[:, hidden] = 0.0, 0.0, 0.0
+    system = System(
+        columns=ids,
+        nuisance=nuisance,
+        free=free,
+        G=G,
+        b=b,
+        c=c,
+        run=np.array([w.run for w in simulator.windows]),
+        back=np.array([_offset(n, offsets) for n in ids[:nuisance]]),
+        slow=slow,
+    )
+    return system
+
+
+def _offset(column: ColumnId, offsets: Mapping[str, float]) -> float:
+    return offsets.get(column.name, 0.0) if isinstance(column, RoughlyKnown) else 0.0

@@ -1,0 +1,86 @@
+"""A variant of the study's chair: what is only roughly known at given values, effects added.
+
+In: nuisances, their offsets, and effects with values. Out: an edit of the chair's specification,
+and the errors of its sensors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import mujoco
+
+from mjchair.diagnosis.data.roughly_known import Nuisance
+from mjchair.diagnosis.fit.column_ids import ParameterId
+from mjchair.diagnosis.replay.sensor_errors import SensorErrors
+from mjchair.effects.effect import Effect, Parameter, SensorError, Values
+
+NUDGE = 0.25  # of a parameter's typical change, by which a derivative is taken
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect with its values; `free` are the parameters that a fit moves."""
+
+    effect: Effect
+    values: Values
+    free: tuple[str, ...]
+
+    @property
+    def parameters(self) -> Iterator[tuple[ParameterId, Parameter]]:
+        """The free parameters with their identifiers."""
+        for name in self.free:
+            yield ParameterId(self.effect.key, name), self.effect.parameter(name)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A variant of the chair.
+
+    Attributes:
+      nuisances: all of the study. offsets: name -> standard deviations, mechanical ones only.
+      terms: the effects that are in it.
+    """
+
+    nuisances: tuple[Nuisance, ...]
+    offsets: dict[str, float] = field(default_factory=dict)
+    terms: tuple[Term, ...] = ()
+
+    def edit(self, spec: mujoco.MjSpec) -> None:
+        """Make the variant of the study's chair."""
+        self.edit_chair(spec)
+        for term in self.terms:
+            if term.effect.sensor is None:
+                term.effect.apply(spec, term.values)
+
+    def edit_chair(self, spec: mujoco.MjSpec) -> None:
+        """Move what is only roughly known, and nothing else."""
+        for n in self.nuisances:
+            if n.edit is not None and self.offsets.get(n.name):
+                n.edit(spec, self.offsets[n.name] * n.std)
+
+    def sensor_errors(self, channels: Sequence[str]) -> SensorErrors:
+        """What its sensors do to the channels."""
+        errors: dict[SensorError, dict[str, float]] = {kind: {} for kind in SensorError}
+        for term in self.terms:
+            effect = term.effect
+            if effect.sensor is not None and effect.channel:
+                errors[effect.sensor][effect.channel] = term.values[effect.sensor]
+        return SensorErrors(
+            channels,
+            bias=errors[SensorError.BIAS],
+            scale=errors[SensorError.SCALE],
+            delay=errors[SensorError.DELAY],
+        )
+
+
+def nudged(variant: Variant, term: Term, parameter: Parameter) -> tuple[Variant, float]:
+    """A variant with one parameter a little aside, and its typical change over that little."""
+    by = NUDGE * parameter.change
+    value = term.values[parameter.name]
+    if not parameter.low <= value + by <= parameter.high:
+        by = -by
+    moved = replace(term, values={**term.values, parameter.name: value + by})
+    terms = tuple(moved if t is term else t for t in variant.terms)
+    return replace(variant, terms=terms), parameter.change / by

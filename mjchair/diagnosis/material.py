@@ -1,0 +1,80 @@
+"""Whether what is missing matters: the missing force against the chair's own rolling resistance.
+
+In: the chair as it was with its columns, and the best explanation. Out: the largest missing force,
+and the limit below which none matters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.data.own_resistance import own_resistance
+from mjchair.diagnosis.data.study import Study
+from mjchair.diagnosis.explain import missing_force
+from mjchair.diagnosis.explain.choice import Choice
+from mjchair.diagnosis.explain.gap import Gap, forces_left, groups
+from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis.fit.column_ids import ColumnId
+from mjchair.diagnosis.replay.pulses import Force
+from mjchair.diagnosis.result import Material
+from mjchair.model.rolling import rear_axle
+
+Array = NDArray[np.float64]
+NEARLY_ALL = 95.0  # percent of the time that the force is smaller
+BY_FORCE = 0.5  # share of a change that forces make: with less it is of a sensor, or of geometry
+
+
+def material(base: Base, gap: Gap, choice: Choice | None) -> Material:
+    """The largest missing force of a study, and its limit.
+
+    The force is the one that does what the best explanation does: the chosen effects, or without
+    any the force that the tests see best.
+    """
+    study = base.bench.simulator.study
+    return Material(largest(base, _explaining(base, gap, choice)), limit(study))
+
+
+def limit(study: Study) -> float:
+    """The force below which none matters, N."""
+    own = study.material
+    return rules.MATERIAL * own_resistance(study.spec) if own is None else own
+
+
+def _explaining(base: Base, gap: Gap, choice: Choice | None) -> list[int]:
+    """Places, among the columns that are no nuisances, of the best explanation."""
+    if choice is not None:
+        return base.reduced.index(choice.hypothesis.columns)
+    forces = forces_left(gap)
+    return groups(base.reduced.columns)[forces[0][0]] if forces else []
+
+
+def largest(base: Base, which: Sequence[int]) -> float:
+    """The largest force forward, or at the wheels for a moment, that columns stand for, N.
+
+    What no force makes, such as the error of a sensor, counts as larger than any limit.
+    """
+    if not which:
+        return 0.0
+    known: list[ColumnId] = [base.reduced.columns[k] for k in which]
+    sizes = base.reduced.solve(list(which))
+    change = [
+        np.asarray(sum(float(s) * base.columns[c][i] for s, c in zip(sizes, known, strict=True)))
+        for i in range(len(base.bench.simulator.windows))
+    ]
+    around = base.around
+    value, share = missing_force.equivalent_force(
+        base.bench, around.track, around.pulses, around.answers, change
+    )
+    if share < BY_FORCE:
+        return float("inf")
+    half = 0.5 * rear_axle(base.bench.simulator.base).track
+    scale = {Force.FORWARD: 1.0, Force.YAW: 1.0 / half}
+    return max(
+        float(np.percentile(np.abs(mine), NEARLY_ALL)) * scale[force]
+        for force in scale
+        if (mine := value[[p.force == force for p in around.pulses]]).size
+    )

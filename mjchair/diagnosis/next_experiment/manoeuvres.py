@@ -1,0 +1,199 @@
+"""Manoeuvres that anyone with the chair can do: the library that the next experiment comes from.
+
+In: a study, which tells where and how hard it drives. Out: manoeuvres with their start and torque.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.diagnosis.data import first_state
+from mjchair.diagnosis.data.study import Study
+from mjchair.simulation.initial import Initial
+from mjchair.simulation.inputs import Inputs
+
+Array = NDArray[np.float64]
+Torque = Callable[[Array], tuple[Array, Array]]
+SECONDS = 6.0  # of a manoeuvre
+LOAD = 15.0  # kg, on the seat
+GRID = 0.01  # s, between samples of a torque
+COAST = 1.8  # m/s
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """One run that could be made.
+
+    Attributes:
+      name: short. words: what to do, for a person who owns the chair.
+      speed: at the start, m/s. turned: heading against the study's, rad. yaw_rate: rad/s.
+      torque: time (s) -> left and right torque as shares of the study's largest; None: a coast.
+      shift: of the start, m, ahead and to the left. loaded: with LOAD on the seat.
+      seconds: how long, s.
+    """
+
+    name: str
+    words: str
+    speed: float = 0.0
+    turned: float = 0.0
+    yaw_rate: float = 0.0
+    torque: Torque | None = None
+    shift: tuple[float, float] = (0.0, 0.0)
+    loaded: bool = False
+    seconds: float = SECONDS
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Where a study drives, and how hard.
+
+    Attributes:
+      position: (x, y) m and heading (rad) of a start. torque: largest, N m; 0 where none is told.
+    """
+
+    position: tuple[float, float]
+    heading: float
+    torque: float
+
+    def initial(self, manoeuvre: Manoeuvre) -> Initial:
+        """How the manoeuvre starts here."""
+        ahead, left = manoeuvre.shift
+        c, s = np.cos(self.heading), np.sin(self.heading)
+        x, y = self.position
+        place = (float(x + c * ahead - s * left), float(y + s * ahead + c * left))
+        heading = self.heading + manoeuvre.turned
+        return Initial(place, heading, manoeuvre.speed, manoeuvre.yaw_rate)
+
+    def inputs(self, manoeuvre: Manoeuvre) -> Inputs | None:
+        """What drives the manoeuvre, in N m."""
+        if manoeuvre.torque is None:
+            return None
+        time = np.arange(0.0, manoeuvre.seconds + 2.0 * GRID, GRID)
+        left, right = manoeuvre.torque(time)
+        controls = {"left_wheel": self.torque * left, "right_wheel": self.torque * right}
+        return Inputs(time, controls, manoeuvre.name)
+
+    def largest(self, manoeuvre: Manoeuvre) -> float:
+        """Largest torque of a wheel in the manoeuvre, N m."""
+        inputs = self.inputs(manoeuvre)
+        return 0.0 if inputs is None else _peak(inputs)
+
+
+def setting(study: Study) -> Setting:
+    """That of the first coast that is fitted to, or else of the first run."""
+    runs = [study.runs[i] for i in study.fitted]
+    coast = next((r for r in runs if r.trial.inputs is None), runs[0])
+    first = first_state.initial(coast, study.axle)
+    driven = [r.trial.inputs for r in runs if r.trial.inputs is not None]
+    torque = float(np.median([_peak(inputs) for inputs in driven] or [0.0]))
+    return Setting(first.position or (0.0, 0.0), first.heading or 0.0, torque)
+
+
+def _peak(inputs: Inputs) -> float:
+    return max(float(np.nanmax(np.abs(v))) for v in inputs.controls.values())
+
+
+def possible(here: Setting) -> list[Manoeuvre]:
+    """The manoeuvres that a lab can make: those with torque only where it measures torque."""
+    return [m for m in LIBRARY if m.torque is None or here.torque > 0.0]
+
+
+def _strokes(time: Array) -> tuple[Array, Array]:
+    phase = np.mod(time - 0.2, 1.15)
+    bell = np.where((time > 0.2) & (phase < 0.46), np.sin(np.pi * phase / 0.46) ** 2, 0.0)
+    return bell, bell
+
+
+def _slalom(frequency: float) -> Torque:
+    def torque(time: Array) -> tuple[Array, Array]:
+        swing = 0.45 * np.sin(2.0 * np.pi * frequency * time)
+        return 0.15 + swing, 0.15 - swing
+
+    return torque
+
+
+def _steps(half: float) -> Torque:
+    """Forward and off in turn, each for `half` (s), with edges that a table can tell."""
+
+    def torque(time: Array) -> tuple[Array, Array]:
+        on = 0.25 + 0.25 * np.tanh(np.sin(np.pi * (time - 0.4) / half) / 0.2)
+        return on, on
+
+    return torque
+
+
+def _flip(time: Array) -> tuple[Array, Array]:
+    on = 0.2 + 0.2 * np.tanh((time - 0.5) / 0.1)
+    return on, on
+
+
+def _spin(time: Array) -> tuple[Array, Array]:
+    turn = 0.4 * np.tanh(np.sin(2.0 * np.pi * time / SECONDS) / 0.2)
+    return -turn, turn
+
+
+def _circle(time: Array) -> tuple[Array, Array]:
+    return np.full_like(time, 0.05), np.full_like(time, 0.25)
+
+
+_SEAT = f" with {LOAD:g} kg more on the seat, strapped down above the axle"
+LIBRARY = (  # simplest first
+    Manoeuvre("stand", "Let it stand with everything recording, brakes off, hands off"),
+    Manoeuvre("coast", "Coast as before, from 1.8 m/s, hands off the wheels", COAST),
+    Manoeuvre(
+        "coast reversed",
+        "Coast the other way over the same floor: start 6 m further, heading turned by 180 "
+        "degrees, from 1.8 m/s",
+        COAST,
+        np.pi,
+        shift=(6.0, 0.0),
+    ),
+    Manoeuvre("coast across", "Coast with the heading turned by 90 degrees", COAST, 0.5 * np.pi),
+    Manoeuvre("fast coast", "Coast from 3 m/s", 3.0),
+    Manoeuvre("slow coast", "Coast from 0.8 m/s", 0.8),
+    Manoeuvre("coast backwards", "Coast backwards from 0.5 m/s", -0.5, seconds=4.0),
+    Manoeuvre("coast in a left turn", "Coast from 1.3 m/s in a turn to the left", 1.3, 0.0, 0.6),
+    Manoeuvre("coast in a right turn", "Coast from 1.3 m/s in a turn to the right", 1.3, 0.0, -0.6),
+    Manoeuvre("coast a metre aside", "Coast with the start moved by 1 m", COAST, shift=(0.0, 1.0)),
+    Manoeuvre("free spin", "Turn it on the spot at about 1.5 rad/s and let go", yaw_rate=1.5),
+    Manoeuvre("pushes", "Push it straight with even strokes from 0.8 m/s", 0.8, torque=_strokes),
+    Manoeuvre("slow slalom", "Drive a slalom, 4 s a wave", 1.0, torque=_slalom(0.25)),
+    Manoeuvre("fast slalom", "Drive a slalom, 1.7 s a wave", 1.0, torque=_slalom(0.6)),
+    Manoeuvre(
+        "short steps", "Drive straight with torque on and off, 0.5 s each", torque=_steps(0.5)
+    ),
+    Manoeuvre("long steps", "Drive straight with torque on and off, 2 s each", torque=_steps(2.0)),
+    Manoeuvre(
+        "reverse, then forward",
+        "Roll backwards at 0.5 m/s in a slight turn, then drive forward, so that the casters flip",
+        -0.5,
+        yaw_rate=0.2,
+        torque=_flip,
+        seconds=4.0,
+    ),
+    Manoeuvre(
+        "driven spin", "Drive it on the spot, 3 s to the left and 3 s to the right", torque=_spin
+    ),
+    Manoeuvre(
+        "circle", "Drive a steady circle to the left at 1 m/s", 1.0, yaw_rate=0.5, torque=_circle
+    ),
+    Manoeuvre("loaded coast", "Coast from 1.8 m/s" + _SEAT, COAST, loaded=True),
+    Manoeuvre(
+        "loaded coast in a turn",
+        "Coast from 1.3 m/s in a turn to the left" + _SEAT,
+        1.3,
+        yaw_rate=0.6,
+        loaded=True,
+    ),
+    Manoeuvre(
+        "loaded slalom",
+        "Drive a slalom, 4 s a wave," + _SEAT,
+        1.0,
+        torque=_slalom(0.25),
+        loaded=True,
+    ),
+)

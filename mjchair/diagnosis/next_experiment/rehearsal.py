@@ -1,0 +1,241 @@
+"""Manoeuvres simulated before anyone makes them, as a study that has not been measured yet.
+
+In: manoeuvres and a chair. Out: what the channels of this and of other chairs would show.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.diagnosis.data.study import Run, Study
+from mjchair.diagnosis.data.windows import Window
+from mjchair.diagnosis.fit.bench import Bench
+from mjchair.diagnosis.fit.column_ids import RoughlyKnown
+from mjchair.diagnosis.fit.nonlinear import Fitted, moved
+from mjchair.diagnosis.fit.variant import Variant
+from mjchair.diagnosis.fit.whitening import Whitener
+from mjchair.diagnosis.next_experiment.manoeuvres import LOAD, Manoeuvre, Setting
+from mjchair.diagnosis.replay.chair_state import SLOW, STEPS, State
+from mjchair.diagnosis.replay.derivatives import Column
+from mjchair.diagnosis.replay.sensor_errors import SensorErrors
+from mjchair.diagnosis.replay.simulator import Job, WindowSimulator
+from mjchair.diagnosis.replay.window_states import Track
+from mjchair.effects.effect import SensorError
+from mjchair.engine.install import installed
+from mjchair.measurement.trial import Trial
+from mjchair.model import inertials
+from mjchair.simulation.initial import start
+
+Array = NDArray[np.float64]
+SEAT = 0.55  # m, height of the load
+TIPPED = 0.8  # of the chair's up axis along the vertical: less is a chair that falls
+FASTEST = 10.0  # m/s, beyond which it is no chair
+# a chair that coasts backwards is not stable: what begins with 0.02 rad/s more may end elsewhere,
+# and nobody can make such a run twice alike
+NUDGE, GROWN = 0.02, 3.0  # rad/s; by how many times it may grow
+
+
+@dataclass(frozen=True)
+class Version:
+    """A variant with its sensors.
+
+    Attributes:
+      bias, scale: channel -> SI or 1, those that stand in no variant.
+    """
+
+    variant: Variant
+    bias: dict[str, float] = field(default_factory=dict)
+    scale: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def mechanics(self) -> tuple[object, ...]:
+        """What its simulation depends on."""
+        terms = [t for t in self.variant.terms if t.effect.sensor is None]
+        values = tuple((t.effect.key, *sorted(t.values.items())) for t in terms)
+        return tuple(sorted(self.variant.offsets.items())), values
+
+    def sensor_errors(self, channels: Sequence[str]) -> SensorErrors:
+        """Its sensors."""
+        seen = self.variant.sensor_errors(channels)
+        bias = {c: seen.bias.get(c, 0.0) + self.bias.get(c, 0.0) for c in channels}
+        scale = {c: seen.scale.get(c, 0.0) + self.scale.get(c, 0.0) for c in channels}
+        return replace(
+            seen,
+            bias={c: b for c, b in bias.items() if b},
+            scale={c: s for c, s in scale.items() if s},
+        )
+
+
+def version(fitted: Fitted, further: Array | None = None) -> Version:
+    """The chair of a fit at its best, or a step (p,) from there."""
+    step = fitted.step if further is None else fitted.step + further
+    system = fitted.system
+    bias, scale = (
+        {
+            n.channel: n.std * float(step[system.places[RoughlyKnown(n.name)]])
+            for n in fitted.variant.nuisances
+            if not n.edit and n.error == error
+        }
+        for error in (SensorError.BIAS, SensorError.SCALE)
+    )
+    return Version(moved(fitted.variant, system, step), bias, scale)
+
+
+class Rehearsal:
+    """Manoeuvres as one chair would make them, cut into windows.
+
+    Attributes:
+      manoeuvres: that the chair comes through and would repeat. first: their states at the start.
+      simulator: of their windows, coarse models only. whitener: of the noise that the study has.
+      track: of the chair, from its own states.
+    """
+
+    def __init__(
+        self, bench: Bench, setting: Setting, manoeuvres: Sequence[Manoeuvre], chair: Version
+    ) -> None:
+        """Simulate the manoeuvres."""
+        self.manoeuvres = list(manoeuvres)
+        self.known: dict[object, mujoco.MjModel] = {}
+        self._plan(bench, setting)
+        self.first = self._starts(chair)
+        traces = self._open_loop(chair, self.first)
+        again = self._nudged(chair)
+        whole = [i for i in range(len(traces)) if self._possible(traces[i], again[i])] or [0]
+        if len(whole) < len(traces):
+            self.manoeuvres = [self.manoeuvres[i] for i in whole]
+            self.first = [self.first[i] for i in whole]
+            self._plan(bench, setting)
+            traces = [traces[i] for i in whole]
+        self.whitener = Whitener(self.simulator, bench.noise)
+        self.track = self._track(chair, traces)
+
+    def _plan(self, bench: Bench, setting: Setting) -> None:
+        source = bench.simulator.study
+        every = _step(source)
+        runs = tuple(_planned(source, setting, m, every) for m in self.manoeuvres)
+        study = replace(source, runs=runs)
+        self.simulator = WindowSimulator(study)
+        windows = [
+            Window(i, 0, 0.0, 0.0, m.seconds, np.arange(runs[i].trial.time.size))
+            for i, m in enumerate(self.manoeuvres)
+        ]
+        self.longer = WindowSimulator(study, windows)
+
+    def model(self, chair: Version, run: int) -> mujoco.MjModel:
+        """The chair's coarse model, with the load where the manoeuvre has it."""
+        load = self.manoeuvres[run].loaded
+        key = (chair.mechanics, load)
+
+        def edit(spec: mujoco.MjSpec) -> None:
+            chair.variant.edit(spec)
+            if load:
+                _load(spec)
+
+        if key not in self.known:
+            self.known[key] = self.simulator.compile(edit, coarse=True)
+        return self.known[key]
+
+    def _starts(self, chair: Version) -> list[State]:
+        out = []
+        with installed():
+            for i, run in enumerate(self.simulator.study.runs):
+                model = self.model(chair, i)
+                data = start(model, run.initial)
+                trace = {"qpos": data.qpos[None], "qvel": data.qvel[None], "act": data.act[None]}
+                out.append(self.simulator.carrier.back(model, trace, 0))
+        return out
+
+    def _open_loop(self, chair: Version, states: Sequence[State]) -> list[dict[str, Array]]:
+        """Traces of whole runs."""
+        windows = self.longer.windows
+        jobs = [
+            Job(self.model(chair, i), w, s)
+            for i, (w, s) in enumerate(zip(windows, states, strict=True))
+        ]
+        return [o.trace for o in self.longer.run(jobs, trace=True)]
+
+    def _nudged(self, chair: Version) -> list[dict[str, Array]]:
+        """Traces of whole runs that start a little turning."""
+        step = NUDGE * np.eye(len(SLOW))[SLOW.index("yaw_rate")]
+        return self._open_loop(chair, [self.simulator.chair.moved(s, step) for s in self.first])
+
+    def _possible(self, trace: dict[str, Array], nudged: dict[str, Array]) -> bool:
+        """Whether a chair stays upright, goes no faster than a chair, and would do it again."""
+        q, v = self.simulator.chair.qpos, self.simulator.chair.dof
+        x, y = trace["qpos"][:, q + 4], trace["qpos"][:, q + 5]
+        upright = 1.0 - 2.0 * (x * x + y * y) > TIPPED
+        slow = np.hypot(trace["qvel"][:, v], trace["qvel"][:, v + 1]) < FASTEST
+        repeats = np.abs(nudged["qvel"][:, v + 5] - trace["qvel"][:, v + 5]) < GROWN * NUDGE
+        return bool((upright & slow & repeats).all())
+
+    def whole(self, chair: Version, which: int) -> Array:
+        """What the channels of a chair show of one whole manoeuvre, (samples, channels)."""
+        window = self.longer.windows[which]
+        job = Job(self.model(chair, which), window, self.first[which])
+        outcome = self.longer.run([job])[0]
+        seen = chair.sensor_errors(self.longer.channels)
+        return seen.applied(self.longer, window, outcome.predicted)
+
+    def _track(self, chair: Version, traces: Sequence[dict[str, Array]]) -> Track:
+        simulator = self.simulator
+        states = []
+        for w in simulator.windows:
+            model = self.model(chair, w.run)
+            at = round(w.start / model.opt.timestep) - 1
+            first = w.index == 0
+            states.append(
+                self.first[w.run] if first else simulator.carrier.back(model, traces[w.run], at)
+            )
+        predicted = self._predict([chair], states)[0]
+        aside = [
+            self._predict([chair], [simulator.chair.moved(s, step) for s in states])[0]
+            for step in STEPS[:, None] * np.eye(len(SLOW))
+        ]
+        slow = [np.stack([a[i] - y for a in aside], axis=2) for i, y in enumerate(predicted)]
+        return Track(states, predicted, slow, [])
+
+    def predict(self, chairs: Sequence[Version]) -> list[Column]:
+        """What each chair's channels show of every window, from the states of the track."""
+        return self._predict(chairs, self.track.states)
+
+    def _predict(self, chairs: Sequence[Version], states: Sequence[State]) -> list[Column]:
+        simulator = self.simulator
+        different = {c.mechanics: c for c in chairs}
+        jobs = [
+            Job(self.model(c, w.run), w, s)
+            for c in different.values()
+            for w, s in zip(simulator.windows, states, strict=True)
+        ]
+        outcomes = iter(simulator.run(jobs))
+        raw = {key: [next(outcomes).predicted for _ in simulator.windows] for key in different}
+        return [
+            [
+                c.sensor_errors(simulator.channels).applied(simulator, w, y)
+                for w, y in zip(simulator.windows, raw[c.mechanics], strict=True)
+            ]
+            for c in chairs
+        ]
+
+
+def _load(spec: mujoco.MjSpec) -> None:
+    """Strap LOAD to the seat, above the centre of mass."""
+    body = inertials.explicit(spec, "chair")
+    inertials.add_mass(body, LOAD, np.array([body.ipos[0], body.ipos[1], SEAT]))
+
+
+def _step(study: Study) -> float:
+    """Median time between samples, s."""
+    return float(np.median([np.median(np.diff(r.trial.time)) for r in study.runs]))
+
+
+def _planned(study: Study, setting: Setting, manoeuvre: Manoeuvre, every: float) -> Run:
+    """A run with nothing but zeros in its channels, a sample `every` (s)."""
+    time = np.arange(0.0, manoeuvre.seconds, every)
+    channels = {c: np.zeros(time.size) for c in study.channels}
+    trial = Trial(manoeuvre.name, time, channels, setting.inputs(manoeuvre), {})
+    return Run(trial, manoeuvre.name, False, setting.initial(manoeuvre), frozenset())

@@ -1,0 +1,221 @@
+"""How far a rival stays behind in a manoeuvre, however it is fitted again: T, in chi2.
+
+In: manoeuvres rehearsed with the chosen chair, and the fit of a rival. Each manoeuvre is one more
+window of the linear system around the rival; the difference that the rival makes is its residual.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.bench import Bench
+from mjchair.diagnosis.fit.column_ids import ColumnId, RoughlyKnown
+from mjchair.diagnosis.fit.elimination import eliminate_window
+from mjchair.diagnosis.fit.nonlinear import Fitted
+from mjchair.diagnosis.fit.system import System
+from mjchair.diagnosis.fit.variant import Term, Variant, nudged
+from mjchair.diagnosis.next_experiment.rehearsal import Rehearsal, version
+from mjchair.diagnosis.replay.derivatives import Column, Point, differences
+from mjchair.diagnosis.replay.sampling import residual
+from mjchair.effects.effect import Effect, SensorError
+from mjchair.effects.effect import step as typical_step
+from mjchair.errors import MjchairError
+
+Array = NDArray[np.float64]
+PHASE = math.pi / math.sqrt(3.0)  # rad, standard deviation of a phase that starts anew each run
+
+
+@dataclass(frozen=True)
+class Separated:
+    """One rival in every manoeuvre.
+
+    Attributes:
+      least: (m,) T, chi2. steps: (m, p) of the rival's coefficients, by which it gets there.
+    """
+
+    least: Array
+    steps: Array
+
+
+def separation(
+    rehearsal: Rehearsal,
+    bench: Bench,
+    rival: Fitted,
+    answers: dict[ColumnId, Column],
+    doubts: dict[ColumnId, Column],
+) -> Separated:
+    """How far a rival stays behind in every manoeuvre, however it is fitted again.
+
+    Args:
+      answers: of the manoeuvres to nuisances and doubts. doubts: their columns in present data.
+    """
+    theirs, columns = _rival_columns(rehearsal, rival)
+    system = _joint(bench, rival, doubts)
+    _add(system, rehearsal, theirs, {**answers, **columns})
+    terms = range(system.nuisance, len(system.columns))
+    before = bounded.solve(system, [0], terms)
+    least, steps = [], []
+    for i in range(len(rehearsal.manoeuvres)):
+        step, total = bounded.solve(system, [0, 1 + i], terms)
+        least.append(max(total - before[1], 0.0))
+        steps.append((step - before[0])[len(doubts) :])
+    return Separated(np.array(least), np.array(steps))
+
+
+def _rival_columns(rehearsal: Rehearsal, rival: Fitted) -> tuple[Column, dict[ColumnId, Column]]:
+    """What a rival's chair shows of every window, and how that answers to its parameters."""
+    middle = version(rival)
+    nudges = {
+        key: nudged(middle.variant, term, parameter)
+        for term in middle.variant.terms
+        for key, parameter in term.parameters
+    }
+    aside = [replace(middle, variant=beside) for beside, _ in nudges.values()]
+    theirs, *changed = rehearsal.predict([middle, *aside])
+    channels = rehearsal.simulator.channels
+    return theirs, {
+        key: _change(column, theirs, channels, factor)
+        for (key, (_, factor)), column in zip(nudges.items(), changed, strict=True)
+    }
+
+
+def _joint(bench: Bench, rival: Fitted, doubts: dict[ColumnId, Column]) -> System:
+    """The present data as one window of a system around the rival's best chair, doubts first."""
+    n = len(doubts)
+    count = n + rival.system.nuisance
+    columns = {**doubts, **rival.columns}
+    system = bench.system(rival.track, columns, count, rival.variant)
+    G = system.G[bench.windows].sum(axis=0)
+    at = np.r_[np.zeros(n), rival.step]
+    b = system.b[bench.windows].sum(axis=0) - G @ at
+    b[:n] = 0.0  # a doubt is about nothing in particular
+    _forget(G, b, system, rival.variant)
+    back = system.back + at[:count]
+    run = np.zeros(1, int)
+    return replace(
+        system, G=G[None], b=b[None], c=np.zeros(1), run=run, back=back, free=0, slow=[], cells=[]
+    )
+
+
+def _add(
+    system: System, rehearsal: Rehearsal, theirs: Column, columns: dict[ColumnId, Column]
+) -> None:
+    """Every manoeuvre as one window more: the difference that the rival makes is its residual."""
+    simulator = rehearsal.simulator
+    m, p = len(rehearsal.manoeuvres), len(system.columns)
+    G, b, c = np.zeros((m, p, p)), np.zeros((m, p)), np.zeros(m)
+    for i, w in enumerate(simulator.windows):
+        miss = residual(rehearsal.track.predicted[i], theirs[i], simulator.channels)
+        nothing = np.zeros_like(miss)
+        known = [columns[n][i] if n in columns else nothing for n in system.columns]
+        window = eliminate_window(
+            simulator, rehearsal.track, rehearsal.whitener, i, miss, np.stack(known, axis=2)
+        )
+        G[w.run] += window.G
+        b[w.run] += window.b
+        c[w.run] += window.chi2
+    system.G, system.b = np.concatenate([system.G, G]), np.concatenate([system.b, b])
+    system.c, system.run = np.concatenate([system.c, c]), np.arange(m + 1)
+
+
+def _forget(G: Array, b: Array, system: System, variant: Variant) -> None:
+    """Take from G (p, p) and b (p,) what is new in a run of another day, such as a phase."""
+    for term in variant.terms:
+        for key, parameter in term.parameters:
+            if not parameter.each_run:
+                continue
+            k = system.places[key]
+            size = max(float(G[k, k]), 1e-12)
+            lean = G[:, k] / size
+            b -= lean * b[k]
+            G -= np.outer(lean, lean) * size
+            G[k, k] = (parameter.change / PHASE) ** 2
+
+
+def nuisance_answers(rehearsal: Rehearsal, chosen: Fitted) -> dict[ColumnId, Column]:
+    """How the manoeuvres answer to one standard deviation of what is only roughly known.
+
+    Taken around the chosen chair; near it they are the same for every rival. The differences to a
+    finer simulation have none: what the present data say of them is only summed out.
+    """
+    middle, base = version(chosen), rehearsal.track.predicted
+    channels = rehearsal.simulator.channels
+    moving = [n for n in chosen.variant.nuisances if n.edit is not None]
+    aside = []
+    for n in moving:
+        offset = middle.variant.offsets.get(n.name, 0.0) + 0.5
+        beside = replace(middle.variant, offsets={**middle.variant.offsets, n.name: offset})
+        aside.append(replace(middle, variant=beside))
+    out: dict[ColumnId, Column] = {
+        RoughlyKnown(n.name): _change(column, base, channels, 2.0)
+        for n, column in zip(moving, rehearsal.predict(aside), strict=True)
+    }
+    for n in chosen.variant.nuisances:
+        if n.edit is None:
+            which = np.array([float(c == n.channel) for c in channels])
+            scaled = n.error == SensorError.SCALE
+            out[RoughlyKnown(n.name)] = [
+                n.std * which * (y if scaled else np.ones_like(y)) for y in base
+            ]
+    return out
+
+
+class Doubts:
+    """Columns of doubted effects in the manoeuvres and in the present data.
+
+    Attributes:
+      answers: of the manoeuvres. columns: of the present data. dropped: a line for each effect
+        that this chair cannot have.
+    """
+
+    def __init__(
+        self, bench: Bench, rehearsal: Rehearsal, chosen: Fitted, effects: Sequence[Effect]
+    ) -> None:
+        """Simulate each of them."""
+        self.answers: dict[ColumnId, Column] = {}
+        self.columns: dict[ColumnId, Column] = {}
+        self.dropped: list[str] = []
+        for effect in effects:
+            key = RoughlyKnown(effect.key)
+            try:
+                answer = doubt_answer(rehearsal, chosen, effect)
+                column = doubt_column(bench, chosen, effect)
+            except MjchairError as error:
+                self.dropped.append(f"{effect.key} was not doubted along: {error}")
+                continue
+            self.answers[key], self.columns[key] = answer, column
+
+
+def doubt_answer(rehearsal: Rehearsal, chosen: Fitted, effect: Effect) -> Column:
+    """How the manoeuvres answer to a typical size of a doubted effect."""
+    middle = version(chosen)
+    terms = (*middle.variant.terms, _typical(effect))
+    beside = replace(middle, variant=replace(middle.variant, terms=terms))
+    (column,) = rehearsal.predict([beside])
+    return _change(column, rehearsal.track.predicted, rehearsal.simulator.channels, 1.0)
+
+
+def doubt_column(bench: Bench, chosen: Fitted, effect: Effect) -> Column:
+    """How the present data answer to it."""
+    points = [Point(partial(effect.apply, values=_typical(effect).values))]
+    simulator = bench.simulator
+    errors = chosen.variant.sensor_errors(simulator.channels)
+    (column,) = differences(simulator, chosen.track, points, chosen.variant.edit, errors)
+    return column
+
+
+def _typical(effect: Effect) -> Term:
+    sizes = {p.name: p.neutral + typical_step(p) for p in effect.fitted}
+    return Term(effect, {**effect.neutral(), **sizes}, ())
+
+
+def _change(column: Column, base: Column, channels: Sequence[str], factor: float) -> Column:
+    pairs = zip(column, base, strict=True)
+    return [factor * residual(y, there, channels) for y, there in pairs]

@@ -1,0 +1,141 @@
+"""The next experiment in words: what to do, what it decides, and what to look for.
+
+In: a `Plan`, or what a missing force goes with. Out: sentences.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from mjchair.diagnosis.explain.column_ids import Driver, Quantity
+from mjchair.diagnosis.next_experiment.design import PLENTY, Evidence, Plan
+from mjchair.diagnosis.replay.simulator import WindowSimulator
+from mjchair.model.wheels import base_name
+from mjchair.simulation.channels import channels
+
+ENOUGH = 3.0  # sigmas that decide
+CLOSE = 0.7  # of the best T, that is worth a word
+OFTEN = 20  # repetitions beyond which nobody would
+NEARLY = 0.8  # of the strongest driver's sigmas
+MOST = 30.0  # sigmas, beyond which the number says nothing more
+
+
+def deciding(plan: Plan, simulator: WindowSimulator) -> str:
+    """The experiment that separates hypotheses which these data cannot tell apart."""
+    best = plan.best
+    units = {c.name: c.unit for c in channels(simulator.base)}
+    units |= {base_name(name): unit for name, unit in units.items()}
+    force = f", with up to {plan.torque:.2g} N m a wheel" if plan.torque else ""
+    said = [f"{best.manoeuvre.words}{force}; record {best.manoeuvre.seconds:g} s."]
+    pairs = zip(plan.chosen, plan.rivals, best.separations, plan.evidence, strict=True)
+    for chosen, rival, t, evidence in pairs:
+        said.append(f"It separates {plain(chosen)} from {plain(rival)} by {_sigmas(t)}.")
+        if evidence.noises > 1.0:
+            said.append(_evidence(evidence, chosen, rival, units[evidence.channel]))
+    said += _again(best.least)
+    near = max(CLOSE * min(best.least, PLENTY), 1.0)
+    others = [e for e in plan.experiments[1:2] if e.least > near]
+    said += [f"Or {_lower(e.manoeuvre.words)} ({_sigmas(e.least)})." for e in others]
+    return " ".join(said)
+
+
+def plain(key: str) -> str:
+    """An effect's key as words."""
+    name, _, channel = key.partition(":")
+    return name.replace("_", " ") + (f" of {channel}" if channel else "")
+
+
+def _sigmas(t: float) -> str:
+    size = math.sqrt(t)
+    return f"more than {MOST:g} sigmas" if size > MOST else f"about {size:.2g} sigmas"
+
+
+def _evidence(evidence: Evidence, chosen: str, rival: str, unit: str) -> str:
+    by = evidence.rival - evidence.chosen
+    unit = "" if unit in ("1", "?") else f" {unit}"
+    return (
+        f"Look at {evidence.channel}: {evidence.time:.1f} s after the start it is "
+        f"{abs(by):.2g}{unit} {'higher' if by > 0.0 else 'lower'} if it is {plain(rival)} "
+        f"({evidence.rival:.3g}{unit}) than if it is {plain(chosen)} ({evidence.chosen:.3g}{unit})."
+    )
+
+
+def _again(least: float) -> list[str]:
+    """What to do where one run does not decide."""
+    if least >= ENOUGH**2:
+        return []
+    times = math.ceil(ENOUGH**2 / max(least, 1e-9))
+    if times > OFTEN:
+        return [
+            f"No manoeuvre of the library decides: this one, the best, would need more than "
+            f"{OFTEN} repetitions. Better sensors or another kind of run are needed."
+        ]
+    return [f"One such run is below {ENOUGH:g} sigmas: repeat it {times} times."]
+
+
+def _lower(words: str) -> str:
+    return words[0].lower() + words[1:]
+
+
+WHEEL = (
+    "Lift the {wheel} off the ground and spin it by hand: a bent rim, a brake or a bearing "
+    "shows as a speed that rises and falls once a turn. Then repeat the run with the wheel started "
+    "half a turn further: what goes with its angle moves along."
+)
+# what the missing force goes with -> what to do, and what it tells
+TIED = {
+    Quantity.SPEED: (
+        "Coast from another speed, half and twice: a force that goes with speed keeps its "
+        "curve over speed, one that only happened at that speed does not."
+    ),
+    Quantity.YAW_RATE: (
+        "Coast in turns to both sides, then straight: what goes with turning is gone in the "
+        "straight one and changes sign with the side."
+    ),
+    Quantity.HEADING: (
+        "Repeat the run with the heading turned by 180 degrees and the start moved by a "
+        "metre: what comes from the floor or the air stays fixed in the room, what comes from"
+        " the chair turns with it."
+    ),
+    Quantity.SWIVEL: (
+        "Start once with the casters trailing and once with them turned aside: what goes with"
+        " a swivel shows only after the second."
+    ),
+    Quantity.TORQUE: (
+        "Coast through the same speeds without torque: what goes with the drive is gone."
+    ),
+    Quantity.STROKE: (
+        "Push again with the rider's motion measured (a column rider_motion, m, the forward "
+        "displacement of the rider's centre of mass in the chair): a body that moves on the "
+        "chair pushes it to and fro with every stroke. Then let someone else push the chair "
+        "with the rider still."
+    ),
+    Quantity.TIME: (
+        "Repeat the run with the largest gap exactly as it was: what happened once does not "
+        "come back, what is tied to the place or the wheel's angle does."
+    ),
+    Quantity.LEFT_TURN: WHEEL.format(wheel="left wheel"),
+    Quantity.RIGHT_TURN: WHEEL.format(wheel="right wheel"),
+}
+OTHERWISE = (
+    "Repeat the run with the largest gap without changes: what comes back at the same place, time "
+    "or wheel angle tells what it is tied to."
+)
+
+
+def searching(drivers: Sequence[tuple[Driver, float]]) -> str:
+    """What to do about a force that no effect explains.
+
+    Args:
+      drivers: what it goes with, and by how many sigmas, strongest first.
+    """
+    if not drivers:
+        return OTHERWISE
+    # a force at a moment fits anything: what else goes with it nearly as well says more
+    telling = [
+        driver
+        for driver, sigmas in drivers
+        if driver.quantity != Quantity.TIME and sigmas > NEARLY * drivers[0][1]
+    ]
+    return TIED[(telling or [drivers[0][0]])[0].quantity]

@@ -1,0 +1,1 @@
+"""Replay of measured runs: windows simulated, their states, derivatives, sensor errors, noise."""

@@ -1,0 +1,141 @@
+"""How every prediction answers to a nuisance or to an effect: one rollout a column.
+
+In: the states of the windows, and edits of the chair. Out: columns, the change of every predicted
+sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.diagnosis.data.roughly_known import Nuisance
+from mjchair.diagnosis.replay.sampling import residual
+from mjchair.diagnosis.replay.sensor_errors import SensorErrors, delayed
+from mjchair.diagnosis.replay.simulator import Job, WindowSimulator
+from mjchair.diagnosis.replay.window_states import Track
+from mjchair.effects.effect import Effect, Seed, SensorError, Values
+from mjchair.engine.install import installed
+
+Array = NDArray[np.float64]
+Column = list[Array]  # (rows, channels) a window
+
+
+@dataclass(frozen=True)
+class Point:
+    """A model to compare with the base: an edit, and what its difference is multiplied by."""
+
+    edit: Callable[[mujoco.MjSpec], None]
+    factor: float = 1.0
+    fine: bool = False
+
+
+def differences(
+    simulator: WindowSimulator,
+    track: Track,
+    points: Sequence[Point],
+    base_edit: Callable[[mujoco.MjSpec], None] | None = None,
+    errors: SensorErrors | None = None,
+) -> list[Column]:
+    """Predictions of edited models minus the track's own, times the factors.
+
+    Args:
+      base_edit: what the track's model already has on top of the study's chair.
+    """
+    seen = errors or SensorErrors(simulator.channels)
+    columns = []
+    with installed():
+        if any(not point.fine for point in points):
+            if track.coarse is None or seen != track.seen:
+                base = simulator.compile(base_edit, coarse=True)
+                track.coarse, track.seen = predictions(simulator, track, base, seen), seen
+            coarse = track.coarse
+        for point in points:
+
+            def edit(spec: mujoco.MjSpec, point: Point = point) -> None:
+                if base_edit is not None:
+                    base_edit(spec)
+                point.edit(spec)
+
+            model = simulator.compile(edit, coarse=not point.fine)
+            reference = track.predicted if point.fine else coarse
+            edited = predictions(simulator, track, model, seen)
+            change = [point.factor * (e - y) for e, y in zip(edited, reference, strict=True)]
+            columns.append(_unwrapped(simulator, change))
+    return columns
+
+
+def predictions(
+    simulator: WindowSimulator,
+    track: Track,
+    model: mujoco.MjModel,
+    errors: SensorErrors,
+    late: float = 0.0,
+) -> Column:
+    """What a model predicts from the states of a track, with its inputs `late` (s)."""
+    jobs = [
+        Job(model, w, s, late=late) for w, s in zip(simulator.windows, track.states, strict=True)
+    ]
+    return [
+        errors.applied(simulator, w, o.predicted)
+        for w, o in zip(simulator.windows, simulator.run(jobs), strict=True)
+    ]
+
+
+def _unwrapped(simulator: WindowSimulator, column: Column) -> Column:
+    nothing = [np.zeros_like(c) for c in column]
+    return [residual(c, n, simulator.channels) for c, n in zip(column, nothing, strict=True)]
+
+
+def half_step(spec: mujoco.MjSpec) -> None:
+    """Simulate with half the step."""
+    spec.option.timestep = 0.5 * spec.option.timestep
+
+
+def other_integrator(spec: mujoco.MjSpec) -> None:
+    """Simulate with MuJoCo's semi-implicit Euler integrator."""
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
+
+
+def sensor_column(
+    simulator: WindowSimulator, track: Track, kind: SensorError, channel: str, size: float
+) -> Column:
+    """What a bias (SI), a scale (1) or a delay (s) of one channel changes."""
+    which = list(simulator.channels).index(channel)
+    out = []
+    for w, y in zip(simulator.windows, track.predicted, strict=True):
+        column = np.zeros_like(y)
+        if kind == SensorError.BIAS:
+            column[:, which] = size
+        elif kind == SensorError.SCALE:
+            column[:, which] = size * y[:, which]
+        else:
+            time = simulator.study.runs[w.run].trial.time[w.rows]
+            column[:, which] = delayed(time, y[:, which], size) - y[:, which]
+        out.append(column)
+    return out
+
+
+def effect_points(effect: Effect, seed: Seed) -> list[Point]:
+    """The models of a seed."""
+
+    def edit(values: Values) -> Callable[[mujoco.MjSpec], None]:
+        return lambda spec: effect.apply(spec, values)
+
+    factors = seed.factors or (1.0,) * len(seed.points)
+    return [Point(edit(v), f) for v, f in zip(seed.points, factors, strict=True)]
+
+
+def nuisance_points(nuisances: Sequence[Nuisance]) -> list[Point]:
+    """One standard deviation of each nuisance, from half of one."""
+
+    def edit(n: Nuisance) -> Callable[[mujoco.MjSpec], None]:
+        assert n.edit is not None
+        change = n.edit
+        return lambda spec: change(spec, 0.5 * n.std)
+
+    return [Point(edit(n), 2.0) for n in nuisances if n.edit is not None]

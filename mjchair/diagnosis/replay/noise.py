@@ -1,0 +1,167 @@
+"""How much each channel scatters: white noise, its correlated part, and rounding.
+
+In: a study. Out: the noise of every channel, with a word on where it comes from. White noise comes
+from third differences, which smooth motion does not reach. What is correlated (drift within a
+window, autoregressive noise) is seen where the chair stands still; without a still stretch it is
+estimated from the study itself, and said so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.diagnosis.data.study import Study
+from mjchair.measurement.sensors import sensor
+
+Array = NDArray[np.float64]
+
+STILL = 0.5  # s, the shortest still stretch that is used
+EDGES = (3.0, 6.0, 10.0)  # Hz, upper edges of the bands in which a study shows its noise
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of one channel.
+
+    Attributes:
+      white: standard deviation, SI. slow: of the correlated part. time: its correlation time, s.
+      source: where the numbers come from.
+      bands: power that the study itself shows below each of EDGES (SI squared, as of samples with
+        that variance); empty: that of white and correlated noise.
+    """
+
+    white: float
+    slow: float
+    time: float
+    source: str
+    bands: tuple[float, ...] = ()
+
+    @property
+    def total(self) -> float:
+        """Standard deviation of white and correlated noise together."""
+        return float(np.hypot(self.white, self.slow))
+
+    def power(self, frequency: Array, step: float) -> Array:
+        """Variance of orthonormal cosines of samples `step` (s) apart, at frequencies (Hz), (n,).
+
+        Of an autoregressive process of first order beside white noise, or the measured bands.
+        """
+        if self.bands:
+            which = np.searchsorted(EDGES, frequency, side="right")
+            return np.asarray(np.array(self.bands)[np.minimum(which, len(self.bands) - 1)])
+        keep = np.exp(-step / self.time)
+        turn = np.cos(2.0 * np.pi * np.asarray(frequency) * step)
+        slow = self.slow**2 * (1.0 - keep**2) / (1.0 + keep**2 - 2.0 * keep * turn)
+        return np.asarray(self.white**2 + slow)
+
+
+def estimate(study: Study) -> dict[str, Noise]:
+    """Noise of every channel, from the runs that are fitted to.
+
+    Runs that are held out tell nothing, but for a channel that no other run has.
+    """
+    return {c: _channel(study, c) for c in study.channels}
+
+
+def telling(study: Study, channel: str) -> tuple[int, ...]:
+    """Indices of the runs that tell the noise of a channel."""
+    have = tuple(i for i, run in enumerate(study.runs) if channel in run.trial.channels)
+    return tuple(i for i in have if i in study.fitted) or have
+
+
+def _channel(study: Study, channel: str) -> Noise:
+    pieces = [study.runs[i].trial.samples(channel) for i in telling(study, channel)]
+    values = [np.unwrap(v) if sensor(channel).wraps else v for _, v in pieces]
+    steps = [float(np.median(np.diff(t))) for t, _ in pieces if t.size > 1]
+    step = float(np.median(steps or [0.01]))
+    rounding = max((_lattice(v) for v in values), default=0.0)
+    white = _white(values)
+    least = max(sensor(channel).floor, rounding / np.sqrt(12.0))
+    given = study.noise.get(channel, study.noise.get(channel.rsplit(".", 1)[0]))
+    still = _still(study, channel)
+    slow, time, source = rounding / np.sqrt(12.0), 0.3, "third differences"
+    if still is not None:
+        drift, rho = still
+        if rho > 0.2:  # autoregressive: most of the scatter is correlated
+            total = max(drift, white)
+            slow = max(slow, total * np.sqrt(min(rho, 0.98)))
+            time = max(-step / np.log(min(max(rho, 0.05), 0.98)), 0.5 * step)
+            white = min(white, total * np.sqrt(1.0 - min(rho, 0.98)))
+            source = "a still stretch (autoregressive)"
+        else:
+            white, source = max(white, drift), "third differences and a still stretch"
+    if given is not None:
+        white, source = max(given, 0.7 * white), "study.toml"
+        if given < 0.7 * white:
+            source = "the data, which scatter more than study.toml says"
+    return Noise(max(white, least), slow, max(time, 1e-3), source)
+
+
+def _white(values: Sequence[Array]) -> float:
+    differences = [np.diff(v, 3) for v in values if v.size > 8]
+    if not differences:
+        return 0.0
+    joined = np.concatenate(differences)
+    robust = 1.4826 * float(np.median(np.abs(joined)))
+    plain = float(np.sqrt(np.mean(np.clip(joined, -6 * robust, 6 * robust) ** 2)))
+    return float(max(robust, plain) / np.sqrt(20.0))
+
+
+def _lattice(values: Array) -> float:
+    """Step of rounding, or 0 where the values do not lie on a lattice of few points."""
+    levels = np.unique(values)
+    if levels.size < 3 or levels.size > 0.5 * values.size:
+        return 0.0
+    return float(np.median(np.diff(levels)))
+
+
+def _still(study: Study, channel: str) -> tuple[float, float] | None:
+    """Scatter and lag-one correlation where the chair stands still; None: it never does."""
+    stretches = []
+    for run in (study.runs[i] for i in telling(study, channel)):
+        for stretch in _still_rows(run.trial.time, run.trial.channels):
+            v = run.trial.channels[channel][stretch]
+            v = v[~np.isnan(v)]
+            if v.size >= 25:
+                ramp = np.arange(v.size)
+                stretches.append(v - np.polyval(np.polyfit(ramp, v, 1), ramp))
+    if not stretches:
+        return None
+    power = sum(float(v @ v) for v in stretches) / sum(v.size - 2 for v in stretches)
+    if power == 0.0:
+        return None
+    rho = sum(float(v[1:] @ v[:-1]) for v in stretches) / sum(float(v @ v) for v in stretches)
+    return float(np.sqrt(power)), rho
+
+
+def _still_rows(time: Array, channels: Mapping[str, Array]) -> list[NDArray[np.int64]]:
+    moving = np.zeros(time.size, bool)
+    seen = False
+    for name, limit in (
+        ("left_wheel_speed", 0.05),
+        ("right_wheel_speed", 0.05),
+        ("velocity.x", 0.02),
+    ):
+        if name in channels:
+            seen = True
+            filled = np.interp(time, time[~np.isnan(channels[name])], _there(channels[name]))
+            width = max(3, int(0.1 / max(float(np.median(np.diff(time))), 1e-4)))
+            smooth = np.convolve(filled, np.ones(width) / width, mode="same")
+            moving |= np.abs(smooth) > limit
+    if not seen:
+        return []
+    edges = np.flatnonzero(np.diff(np.r_[1, moving.astype(int), 1]))
+    out = []
+    for a, b in zip(edges[::2], edges[1::2], strict=False):
+        if time[b - 1] - time[a] > STILL + 0.3:
+            rows = np.arange(a, b)
+            out.append(rows[time[rows] > time[a] + 0.3])
+    return out
+
+
+def _there(values: Array) -> Array:
+    return np.asarray(values[~np.isnan(values)])

@@ -1,0 +1,148 @@
+"""Pulses of force: triangular forces in time that every window's predictions are asked about.
+
+In: windows with their states. Out: for every pulse of one newton (or newton metre) what it changes
+in the samples of its window. Sums of pulses make a force of any course.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.diagnosis.replay.chair_state import Chair
+from mjchair.diagnosis.replay.derivatives import predictions
+from mjchair.diagnosis.replay.sensor_errors import SensorErrors
+from mjchair.diagnosis.replay.simulator import Job, WindowSimulator
+from mjchair.diagnosis.replay.window_states import Track
+from mjchair.engine.install import installed
+
+Array = NDArray[np.float64]
+AT_ONCE = 64  # pulses that are simulated together
+
+
+class Force(StrEnum):
+    """A generalized force on the chair.
+
+    FORWARD and LEFTWARD act along the chair's axes at the ground below the axle, YAW about its
+    vertical, the wheels' torques about their axles.
+    """
+
+    FORWARD = "Fx"
+    LEFTWARD = "Fy"
+    YAW = "Mz"
+    LEFT_WHEEL = "left_wheel"
+    RIGHT_WHEEL = "right_wheel"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How pulses of a force are made: unit, size (in the unit), and time between peaks (s)."""
+
+    unit: str
+    size: float
+    apart: float
+
+
+KINDS = {
+    Force.FORWARD: Kind("N", 5.0, 0.2),
+    Force.LEFTWARD: Kind("N", 5.0, 1.0),
+    Force.YAW: Kind("N m", 2.0, 0.2),
+    Force.LEFT_WHEEL: Kind("N m", 1.0, 1.0),
+    Force.RIGHT_WHEEL: Kind("N m", 1.0, 1.0),
+}
+WHEELS = (Force.LEFT_WHEEL, Force.RIGHT_WHEEL)
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """A force that rises and falls about a time.
+
+    Attributes:
+      force: which. window: index. time: of its peak, s. width: half of its base, s.
+    """
+
+    force: Force
+    window: int
+    time: float
+    width: float
+
+
+def pulses(simulator: WindowSimulator) -> list[Pulse]:
+    """Triangular pulses that add up to one throughout every window, for every force."""
+    out = []
+    for i, w in enumerate(simulator.windows):
+        for force, kind in KINDS.items():
+            count = max(2, round((w.last - w.first) / kind.apart) + 1)
+            times = np.linspace(w.first, w.last, count)
+            out += [Pulse(force, i, float(t), float(times[1] - times[0])) for t in times]
+    return out
+
+
+def pulse_answers(
+    simulator: WindowSimulator,
+    track: Track,
+    asked: Sequence[Pulse],
+    base_edit: Callable[[mujoco.MjSpec], None] | None = None,
+) -> list[Array]:
+    """What each pulse of one newton or newton metre changes in its own window, (rows, channels)."""
+    out = []
+    model = simulator.compile(base_edit, coarse=True)
+    with installed():
+        reference = predictions(simulator, track, model, SensorErrors(simulator.channels))
+        for at in range(0, len(asked), AT_ONCE):
+            group = asked[at : at + AT_ONCE]
+            jobs = [
+                Job(
+                    model,
+                    simulator.windows[p.window],
+                    track.states[p.window],
+                    _force(simulator, track, p, float(model.opt.timestep)),
+                )
+                for p in group
+            ]
+            for p, outcome in zip(group, simulator.run(jobs), strict=True):
+                out.append((outcome.predicted - reference[p.window]) / KINDS[p.force].size)
+    return out
+
+
+def _force(simulator: WindowSimulator, track: Track, pulse: Pulse, step: float) -> Array:
+    """Generalized force (steps, nv) of a pulse on a grid of simulation steps (s)."""
+    chair, w = simulator.chair, simulator.windows[pulse.window]
+    steps = int(np.ceil(simulator.steps * simulator.step / step)) + 1
+    every = max(1, round(step / simulator.step))
+    time = w.start + step * np.arange(steps)
+    shape = np.clip(1.0 - np.abs(time - pulse.time) / pulse.width, 0.0, None)
+    if pulse.time - pulse.width < w.first:  # the first pulse acts from the start of the lead
+        shape[time < pulse.time] = 1.0
+    force = np.zeros((steps, simulator.base.nv))
+    size = KINDS[pulse.force].size * shape
+    if pulse.force in WHEELS:
+        force[:, chair.rear[WHEELS.index(pulse.force)].dof] = size
+    elif pulse.force == Force.YAW:
+        force[:, chair.dof + 5] = size
+    else:
+        x, y = headings(chair, track.trace[pulse.window]["qpos"])
+        x, y = _held(x[::every], steps), _held(y[::every], steps)
+        east, north = (x, y) if pulse.force == Force.FORWARD else (-y, x)
+        force[:, chair.dof] = size * east
+        force[:, chair.dof + 1] = size * north
+    return force
+
+
+def _held(values: Array, steps: int) -> Array:
+    """The first `steps` values; the last one is held where there are fewer."""
+    missing = steps - len(values)
+    return values[:steps] if missing <= 0 else np.pad(values, (0, missing), "edge")
+
+
+def headings(chair: Chair, qpos: Array) -> tuple[Array, Array]:
+    """Cosine and sine of the heading along a trace (n, nq)."""
+    w, x, y, z = (qpos[:, chair.qpos + 3 + k] for k in range(4))
+    east, north = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)
+    size = np.hypot(east, north)
+    return east / size, north / size

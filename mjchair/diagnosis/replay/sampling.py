@@ -1,0 +1,58 @@
+"""From a simulation's sensor data to the samples of a table, and the difference of two of these.
+
+In: sensor data at every step. Out: (rows, channels) at the times of the samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.errors import MjchairError, nearest
+from mjchair.measurement.sensors import sensor
+from mjchair.model.wheels import base_name
+from mjchair.simulation.channels import channels
+
+Array = NDArray[np.float64]
+
+
+def places(model: mujoco.MjModel, wanted: Sequence[str]) -> list[int]:
+    """Places of channels in the sensor data of a model.
+
+    Raises:
+      MjchairError: the model has no sensor of a channel's name.
+    """
+    full = {c.name: c.index for c in channels(model)}
+    short = {base_name(name): index for name, index in full.items()}
+    for channel in wanted:
+        if channel not in full and channel not in short:
+            raise MjchairError(f"unknown channel {channel!r}" + nearest(channel, {*full, *short}))
+    return [full[c] if c in full else short[c] for c in wanted]
+
+
+def sampled(sensed: Array, step: float, time: Array, names: Sequence[str]) -> Array:
+    """Sensor data at the times of samples, (rows, channels).
+
+    Args:
+      sensed: (steps, channels); row k belongs to the state before step k, each `step` (s) long.
+      time: (rows,) s from the start of the simulation. names: of the channels.
+    """
+    at = np.clip(time / step, 0.0, len(sensed) - 1.001)
+    low = at.astype(int)
+    share = (at - low)[:, None]
+    for i, name in enumerate(names):
+        if sensor(name).wraps:
+            sensed[:, i] = np.unwrap(sensed[:, i])
+    return np.asarray((1.0 - share) * sensed[low] + share * sensed[low + 1])
+
+
+def residual(measured: Array, predicted: Array, names: Sequence[str]) -> Array:
+    """Measured minus predicted (rows, channels); angles that wrap stay within half a turn."""
+    out = measured - predicted
+    for i, name in enumerate(names):
+        if sensor(name).wraps:
+            out[:, i] = (out[:, i] + np.pi) % (2.0 * np.pi) - np.pi
+    return out

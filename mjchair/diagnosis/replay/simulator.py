@@ -1,0 +1,318 @@
+"""Windows simulated, many at once: predictions of every measured channel at every sample.
+
+In: jobs, each a model with a window and its state. Out: predictions (rows, channels), and states
+along the way where asked for.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.diagnosis.data.study import Run, Study
+from mjchair.diagnosis.data.windows import Window, cut
+from mjchair.diagnosis.replay import strokes
+from mjchair.diagnosis.replay.cache import Part, Store, digest
+from mjchair.diagnosis.replay.chair_state import Chair, State
+from mjchair.diagnosis.replay.measured_motion import motions
+from mjchair.diagnosis.replay.sampling import places, sampled
+from mjchair.diagnosis.replay.state_transfer import StateCarrier
+from mjchair.engine.install import installed
+from mjchair.errors import MjchairError
+from mjchair.model.visual_geoms import without_looks
+from mjchair.model.wheels import COMFORTABLE, check_timestep, cut_damping
+from mjchair.simulation import batch, names
+
+Array = NDArray[np.float64]
+FORCE = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+THREADS = 2
+
+
+@dataclass
+class Job:
+    """One window of one model.
+
+    Attributes:
+      model: what is simulated. window: which. state: at the window's start, of the base model.
+      force: (steps, nv) generalized force on top, or None. late: s, by which inputs come later.
+    """
+
+    model: mujoco.MjModel
+    window: Window
+    state: State
+    force: Array | None = None
+    late: float = 0.0
+
+
+@dataclass
+class Outcome:
+    """What a job gave: predictions (rows, channels), and states along the way where asked for."""
+
+    predicted: Array
+    trace: dict[str, Array] = field(default_factory=dict)
+
+
+class WindowSimulator:
+    """Simulates windows of a study's runs.
+
+    Attributes:
+      study, channels, windows: what is simulated. step: of the simulation, s.
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        windows: Sequence[Window] | None = None,
+        store: Store | None = None,
+        threads: int = THREADS,
+    ) -> None:
+        """Cut the runs; simulations are kept in the store, where there is one."""
+        self.store = store
+        self.threads = threads
+        self.study = study
+        self.channels = study.channels
+        self.spec = without_looks(study.spec)
+        self.base = self.spec.copy().compile()
+        self.chair = Chair(self.base)
+        self.step = float(self.base.opt.timestep)
+        self.windows = list(windows) if windows is not None else cut(study.runs, self.step)
+        longest = max(w.last - w.start for w in self.windows)
+        self.steps = int(np.ceil(longest / self.step)) + 3
+        self.coarse = self._coarse_step()
+        self._places: dict[int, list[int]] = {}
+        self.motions = [motions(run) | strokes.courses(run) for run in study.runs]
+        self.carrier = StateCarrier(self.base, self.chair)
+        self.studied = digest(part for run in study.runs for part in _given(run))
+
+    def _coarse_step(self) -> float:
+        """Twice the step where the tires allow it: enough for differences of two simulations."""
+        model = copy.copy(self.base)
+        model.opt.timestep = 2.0 * self.step
+        try:
+            check_timestep(model)
+        except MjchairError:
+            return self.step
+        return 2.0 * self.step
+
+    def compile(
+        self, edit: Callable[[mujoco.MjSpec], None] | None = None, coarse: bool = False
+    ) -> mujoco.MjModel:
+        """The base model, edited; `coarse` for differences.
+
+        Raises:
+          MjchairError: the edit makes what no model can be.
+        """
+        spec = self.spec.copy()
+        try:
+            if edit is not None:
+                edit(spec)
+            model = spec.compile()
+            return self.coarsened(model) if coarse else model
+        except MjchairError:
+            raise
+        except (ValueError, mujoco.FatalError) as error:
+            line = " ".join(str(error).split())
+            raise MjchairError(f"an effect does not compile: {line}") from None
+
+    def coarsened(self, model: mujoco.MjModel) -> mujoco.MjModel:
+        """A copy at the coarse step, its tires stable also under more than their nominal load."""
+        coarse = copy.copy(model)
+        coarse.opt.timestep *= self.coarse / self.step
+        cut_damping(coarse, above=COMFORTABLE)
+        return coarse
+
+    def input_step(self) -> float:
+        """Median time between samples of the inputs, s; 0 where nothing is driven."""
+        steps = [
+            float(np.median(np.diff(r.trial.inputs.time)))
+            for r in self.study.runs
+            if r.trial.inputs is not None and r.trial.inputs.time.size > 1
+        ]
+        return max(steps, default=0.0)
+
+    def measured(self, window: Window) -> Array:
+        """Samples (rows, channels) of a window, NaN where missing."""
+        trial = self.study.runs[window.run].trial
+        nothing = np.full(window.rows.size, np.nan)
+        return np.column_stack(
+            [
+                trial.channels[c][window.rows] if c in trial.channels else nothing
+                for c in self.channels
+            ]
+        )
+
+    def controls(
+        self, model: mujoco.MjModel, window: Window, steps: int, late: float = 0.0
+    ) -> Array:
+        """Controls (steps, nu) of a window: measured torques, and the rider's motion."""
+        time = np.asarray(window.start + float(model.opt.timestep) * np.arange(steps) - late)
+        out = np.zeros((steps, model.nu))
+        inputs = self.study.runs[window.run].trial.inputs
+        known = names.actuators(model)
+        if inputs is not None:
+            out = inputs.control_array(model, time)
+        for column, motion in self.motions[window.run].items():
+            if column in known:
+                a = known.index(column)
+                out[:, a] = motion.place_at(time + _lag(model, a))
+        return out
+
+    def _followed(self, model: mujoco.MjModel, joint: str, job: Job) -> tuple[float, float] | None:
+        """Place and speed that the motions ask of a joint; None: none of them drives it."""
+        mine = model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
+        mine &= model.actuator_trnid[:, 0] == names.joints(model).index(joint)
+        known, stiffness = names.actuators(model), -model.actuator_biasprm[mine, 1].sum()
+        motions = self.motions[job.window.run]
+        if stiffness <= 0.0 or not any(known[a] in motions for a in np.flatnonzero(mine)):
+            return None
+        place = speed = 0.0
+        for a in np.flatnonzero(mine):
+            if known[a] in motions:
+                share = float(model.actuator_gainprm[a, 0] / stiffness)
+                there = motions[known[a]].start(job.window.start - job.late)
+                place, speed = place + share * there[0], speed + share * there[1]
+        return place, speed
+
+    def run(self, jobs: Sequence[Job], trace: bool = False) -> list[Outcome]:
+        """Simulate the jobs, or load what the store kept of them; traces are not kept."""
+        if self.store is None or trace:
+            return self._simulate(jobs, trace)
+        key = self._key(jobs, self.store)
+        predicted = self.store.load(key)
+        if predicted is None:
+            predicted = [outcome.predicted for outcome in self._simulate(jobs, trace)]
+            self.store.save(key, predicted)
+        return [Outcome(values) for values in predicted]
+
+    def _key(self, jobs: Sequence[Job], store: Store) -> str:
+        """Digest of all that the jobs' predictions follow from."""
+        parts: list[Part] = [self.studied, self.steps, self.step, *self.channels]
+        models = {id(job.model): job.model for job in jobs}
+        places = {name: k for k, name in enumerate(models)}
+        for job in jobs:
+            w, state = job.window, job.state
+            parts += [places[id(job.model)], job.late, w.run, w.start, w.rows]
+            parts += [state.qpos, state.qvel, state.act]
+            parts.append(job.force if job.force is not None else "free")
+        return store.key(models.values(), parts)
+
+    def _simulate(self, jobs: Sequence[Job], trace: bool) -> list[Outcome]:
+        """Equal model sizes go together."""
+        outcomes: list[Outcome | None] = [None] * len(jobs)
+        models, driven = [job.model for job in jobs], [job.force is None for job in jobs]
+        record = ("sensordata", *(("qpos", "qvel", "act") if trace else ()))
+        for chunk in batch.groups(models, self._steps, record, driven):
+            with installed():
+                done = self._chunk([jobs[i] for i in chunk], record)
+            for i, outcome in zip(chunk, done, strict=True):
+                outcomes[i] = outcome
+        return [o for o in outcomes if o is not None]
+
+    def _steps(self, model: mujoco.MjModel) -> int:
+        return int(np.ceil(self.steps * self.step / model.opt.timestep)) + 1
+
+    def _chunk(self, jobs: list[Job], record: Sequence[str]) -> list[Outcome]:
+        models = [_coasting(self.study.runs[j.window.run], j.model) for j in jobs]
+        model = models[0]
+        steps = self._steps(model)
+        kept: dict[tuple[int, int, float], Array] = {}
+        rows = []
+        for job, m in zip(jobs, models, strict=True):
+            key = (id(job.window), m.nu, job.late)
+            if key not in kept:
+                kept[key] = self.controls(m, job.window, steps, job.late)
+            rows.append(kept[key])
+        control, what = np.stack(rows), batch.CONTROL
+        if jobs[0].force is not None:
+            forces = np.stack([_resized(j.force, steps) for j in jobs])
+            control, what = np.concatenate([control, forces], axis=2), what | FORCE
+        states = self._states(jobs, model)
+        out, _ = batch.roll(models, states, control, what=what, record=record, threads=self.threads)
+        return [
+            Outcome(
+                self._sampled(model, job.window, out["sensordata"][i]),
+                {k: out[k][i] for k in record[1:]},
+            )
+            for i, job in enumerate(jobs)
+        ]
+
+    def _states(self, jobs: list[Job], model: mujoco.MjModel) -> dict[str, Array]:
+        """Of the jobs' starts: time (jobs,), qpos, qvel and act (jobs, ...)."""
+        states = [self._state_in(job) for job in jobs]
+        return {
+            "time": np.array([job.window.start for job in jobs]),
+            "qpos": np.stack([state.qpos for state in states]),
+            "qvel": np.stack([state.qvel for state in states]),
+            "act": np.stack([state.act for state in states]),
+        }
+
+    def _state_in(self, job: Job) -> State:
+        """The state where a job starts, in its own model."""
+        state, new = self.carrier.into(job.model, job.state)
+        for name, (q, v) in new.joints.items():
+            followed = self._followed(job.model, name, job)
+            if followed is not None:
+                state.qpos[q], state.qvel[v] = followed
+        if new.activations:
+            controls = self.controls(job.model, job.window, 1)[0]
+            for actuator, at in new.activations.items():
+                state.act[at] = controls[actuator]
+        return state
+
+    def _sampled(self, model: mujoco.MjModel, window: Window, sensed: Array) -> Array:
+        """Sensor data (steps, nsensordata) at the samples of the window, (rows, channels)."""
+        if model.nsensordata not in self._places:
+            self._places[model.nsensordata] = places(model, self.channels)
+        values = sensed[:, self._places[model.nsensordata]]
+        time = self.study.runs[window.run].trial.time[window.rows] - window.start
+        return sampled(values, model.opt.timestep, time, self.channels)
+
+
+def _lag(model: mujoco.MjModel, actuator: int) -> float:
+    """Time (s) by which a joint comes after its position inputs: damping over stiffness.
+
+    A spring and a damper hold the joint to a place that moves. The damper brakes against the
+    chair, so the joint is late by that time; inputs that are given as much earlier make it follow.
+    """
+    of_joint = model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
+    of_joint &= model.actuator_trnid[:, 0] == model.actuator_trnid[actuator, 0]
+    stiffness, damping = -model.actuator_biasprm[of_joint, 1:3].sum(axis=0)
+    return float(damping / stiffness) if stiffness > 0.0 else 0.0
+
+
+def _given(run: Run) -> Iterator[Part]:
+    """What of a run its simulation follows from: times, inputs, the rider's motion."""
+    trial = run.trial
+    yield trial.time
+    if trial.inputs is not None:
+        yield trial.inputs.time
+        yield "hold" if trial.inputs.hold else "straight"
+    for columns in (trial.inputs.controls if trial.inputs is not None else {}, trial.other):
+        for name, values in columns.items():
+            yield name
+            yield values
+
+
+def _resized(force: Array | None, steps: int) -> Array:
+    assert force is not None
+    return (
+        force[:steps] if len(force) >= steps else np.pad(force, ((0, steps - len(force)), (0, 0)))
+    )
+
+
+def _coasting(run: Run, model: mujoco.MjModel) -> mujoco.MjModel:
+    """In a run without torque nothing is driven, so a drive's own braking is off."""
+    if run.trial.inputs is not None:
+        return model
+    known = names.actuators(model)
+    rear = [names.find(w, known, "actuator") for w in ("left_wheel", "right_wheel")]
+    if not model.actuator_biasprm[rear].any():
+        return model
+    off = copy.copy(model)
+    off.actuator_biasprm[rear] = 0.0
+    return off

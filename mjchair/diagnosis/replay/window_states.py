@@ -1,0 +1,278 @@
+"""The state along the runs: each window's slow state fitted to its own samples, one after another.
+
+In: a model, and the noise of the channels. Out: a `Track`: states, predictions, and how these
+answer to the slow state. The fast part of the state is handed from window to window by the
+simulation itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.diagnosis.data import first_state
+from mjchair.diagnosis.data.windows import Window
+from mjchair.diagnosis.replay.chair_state import BROAD, LINKED, SLOW, STANDING, STEPS, Chair, State
+from mjchair.diagnosis.replay.noise import Noise
+from mjchair.diagnosis.replay.sampling import residual
+from mjchair.diagnosis.replay.sensor_errors import SensorErrors
+from mjchair.diagnosis.replay.simulator import Job, Outcome, WindowSimulator
+from mjchair.engine.install import installed
+from mjchair.measurement.sensors import sensor
+from mjchair.simulation import names
+from mjchair.simulation.initial import position_joints, start
+
+Array = NDArray[np.float64]
+ROUNDS = 2  # Gauss-Newton rounds a window
+
+
+@dataclass
+class Track:
+    """The windows' states.
+
+    Attributes:
+      states: at the start of each window, as of the base model. predicted: (rows, channels) each.
+      slow: d predicted / d slow state, (rows, channels, 7) each, times chair.STEPS.
+      trace: qpos, qvel and act along each window, after each step. coarse: predictions at the
+        coarse step, once they were needed; seen: by what sensors.
+    """
+
+    states: list[State]
+    predicted: list[Array]
+    slow: list[Array]
+    trace: list[dict[str, Array]]
+    coarse: list[Array] | None = None
+    seen: SensorErrors | None = None
+
+
+def first_states(simulator: WindowSimulator, model: mujoco.MjModel) -> dict[int, State]:
+    """Each run's state at its first sample: settled, and rolling as its channels say."""
+    out = {}
+    with installed():
+        for i, run in enumerate(simulator.study.runs):
+            begin = float(run.trial.time[0]) + float(model.opt.timestep) * np.arange(2)
+            inputs = run.trial.inputs
+            controls = None if inputs is None else inputs.control_array(model, begin)
+            data = start(
+                model,
+                first_state.initial(run, simulator.study.axle),
+                controls=None if controls is None else controls[0],
+            )
+            if controls is not None:
+                for actuator, joint in position_joints(model).items():
+                    rate = float(np.diff(controls[:, actuator])[0]) / model.opt.timestep
+                    data.qvel[model.jnt_dofadr[joint]] = rate
+            known = names.joints(model)
+            for side in ("left", "right"):
+                seen = first_state._first(run, f"{side}_caster_angle")
+                if seen is not None:
+                    j = names.find(f"{side}_caster_swivel", known, "joint")
+                    data.qpos[model.jnt_qposadr[j]] = seen[0]
+            out[i] = State(data.qpos.copy(), data.qvel.copy(), data.act.copy())
+    return out
+
+
+def prior(simulator: WindowSimulator, window: int, state: State) -> Array:
+    """Standard deviation of the slow state of a window that starts at `state`, (7,)."""
+    spread = _moving_prior(simulator, window)
+    if simulator.chair.stands(state):
+        spread[3:5] = STANDING
+    # nothing tells where an unseen position is; what its column answers is rounding, and a large
+    # residual would be laid on it
+    spread[:2][~first_state.observed(simulator.study.runs[simulator.windows[window].run])[:2]] = (
+        1e-6
+    )
+    return spread
+
+
+def _moving_prior(simulator: WindowSimulator, window: int) -> Array:
+    w = simulator.windows[window]
+    seen = first_state.observed(simulator.study.runs[w.run])
+    if w.index == 0:
+        loose = np.where(seen, BROAD, np.array([1.0, 1.0, 0.05, 1.0, 0.3, 0.3, 0.3]))
+        loose[5:] = np.where(seen[5:], BROAD[5:], 0.3)  # nothing has turned the casters yet
+        given = simulator.study.runs[w.run].given
+        if "speed" in given and not seen[3]:
+            loose[3] = 0.1
+        return loose
+    return np.where(seen, BROAD, LINKED).copy()
+
+
+def track(
+    simulator: WindowSimulator,
+    model: mujoco.MjModel,
+    noise: dict[str, Noise],
+    errors: SensorErrors | None = None,
+    before: Track | None = None,
+    anew: bool = False,
+) -> Track:
+    """Fit the slow state of every window.
+
+    Args:
+      model: of any size; states are those of the base model. before: a track to start from, of a
+        model that is not far; its answers to the slow state are kept, unless made `anew`.
+    """
+    chair = simulator.chair
+    coarse = simulator.coarsened(model)
+    white = np.array([noise[c].total for c in simulator.channels])
+    errors = errors or SensorErrors(simulator.channels)
+    count = len(simulator.windows)
+    by_index: dict[int, list[int]] = {}
+    for i, w in enumerate(simulator.windows):
+        by_index.setdefault(w.index, []).append(i)
+    states = _begun(simulator) if before is None else [s.copy() for s in before.states]
+    predicted: list[Array] = [np.empty(0)] * count
+    kept = before is not None and not anew
+    slow: list[Array] = list(before.slow) if before and kept else [np.empty(0)] * count
+    traces: list[dict[str, Array]] = [{}] * count
+    with installed():
+        for index in sorted(by_index):
+            members = by_index[index]
+            search = {i: Search(states[i], states[i]) for i in members}
+            for _ in range(ROUNDS):
+                _fit_round(
+                    simulator, chair, (model, coarse), errors, search, white, predicted, slow, kept
+                )
+            outcomes = _traced(simulator, model, [(i, search[i].state) for i in members])
+            for i, outcome in outcomes.items():
+                w = simulator.windows[i]
+                predicted[i] = errors.applied(simulator, w, outcome.predicted)
+                search[i].judge(_size(simulator, w, predicted[i], white))
+            worse = [i for i in members if search[i].state is not search[i].best]
+            again = _traced(simulator, model, [(i, search[i].best) for i in worse])
+            for i in members:
+                outcome = again.get(i, outcomes[i])
+                predicted[i] = errors.applied(simulator, simulator.windows[i], outcome.predicted)
+                states[i], traces[i] = search[i].best, outcome.trace
+                if before is None:
+                    _hand_over(simulator, model, i, outcome.trace, states)
+    return Track(states, predicted, slow, traces)
+
+
+def _begun(simulator: WindowSimulator) -> list[State]:
+    """For every window the state at the first sample of its run."""
+    firsts = first_states(simulator, simulator.base)
+    return [firsts[w.run].copy() for w in simulator.windows]
+
+
+@dataclass
+class Search:
+    """The state of one window while it is fitted.
+
+    Attributes:
+      state: that was tried last. best, size: the best so far, and its misfit. change: from the
+        best to the one that was tried.
+    """
+
+    state: State
+    best: State
+    size: float = np.inf
+    change: Array = field(default_factory=lambda: np.zeros(len(SLOW)))
+
+    def judge(self, size: float) -> bool:
+        """Take the misfit of the state; False where it is worse than the best."""
+        if size > 1.001 * self.size:
+            return False
+        self.best, self.size = self.state, size
+        return True
+
+
+def _traced(
+    simulator: WindowSimulator, model: mujoco.MjModel, which: list[tuple[int, State]]
+) -> dict[int, Outcome]:
+    jobs = [Job(model, simulator.windows[i], state) for i, state in which]
+    done = simulator.run(jobs, trace=True) if jobs else []
+    return {i: outcome for (i, _), outcome in zip(which, done, strict=True)}
+
+
+def _size(simulator: WindowSimulator, window: Window, seen: Array, white: Array) -> float:
+    """Misfit of a window, where its free columns fit it best."""
+    miss = residual(simulator.measured(window), seen, simulator.channels)
+    free = zero_columns(simulator).any(axis=1)
+    miss[:, free] -= np.nanmean(miss[:, free], axis=0) if free.any() else 0.0
+    return float(np.nansum((miss / white) ** 2))
+
+
+def _fit_round(
+    simulator: WindowSimulator,
+    chair: Chair,
+    models: tuple[mujoco.MjModel, mujoco.MjModel],
+    errors: SensorErrors,
+    search: dict[int, Search],
+    white: Array,
+    predicted: list[Array],
+    slow: list[Array],
+    kept: bool,
+) -> None:
+    """One Gauss-Newton step of the slow states; `kept`: their columns are known."""
+    jobs = []
+    for i, s in search.items():
+        w = simulator.windows[i]
+        jobs.append(Job(models[0], w, s.state))
+        if kept:
+            continue
+        jobs.append(Job(models[1], w, s.state))
+        jobs += [
+            Job(models[1], w, chair.moved(s.state, STEPS[k] * np.eye(len(SLOW))[k]))
+            for k in range(len(SLOW))
+        ]
+    outcomes = simulator.run(jobs)
+    each = 1 if kept else 2 + len(SLOW)
+    for n, (i, s) in enumerate(search.items()):
+        w = simulator.windows[i]
+        seen = [
+            errors.applied(simulator, w, o.predicted) for o in outcomes[n * each : n * each + each]
+        ]
+        if not s.judge(_size(simulator, w, seen[0], white)):
+            s.change = 0.3 * s.change  # a step too far
+            s.state = chair.moved(s.best, s.change)
+            continue
+        predicted[i] = seen[0]
+        if not kept:
+            slow[i] = np.stack([y - seen[1] for y in seen[2:]], axis=2)
+        s.change = _step(simulator, i, s.state, seen[0], slow[i], white) * STEPS
+        s.state = chair.moved(s.state, s.change)
+
+
+def _step(
+    simulator: WindowSimulator, i: int, state: State, seen: Array, slow: Array, white: Array
+) -> Array:
+    """Linear step of a window's slow state, in units of chair.STEPS, (7,)."""
+    miss = residual(simulator.measured(simulator.windows[i]), seen, simulator.channels)
+    there = ~np.isnan(miss)
+    columns = np.concatenate([slow, zero_columns(simulator)[None].repeat(len(miss), 0)], 2)
+    a = (columns / white[None, :, None])[there]
+    b = (miss / white)[there]
+    spread = np.r_[prior(simulator, i, state) / STEPS, np.full(columns.shape[2] - len(SLOW), 1e4)]
+    normal = a.T @ a + np.diag(1.0 / spread**2)
+    change = np.linalg.solve(normal, a.T @ b)[: len(SLOW)]
+    # shortened, never turned
+    return np.asarray(change * min(1.0, 20.0 / max(np.abs(change).max(), 1e-9)))
+
+
+def zero_columns(simulator: WindowSimulator) -> Array:
+    """Channels whose zero is free in each window, such as wheel angles, (channels, n)."""
+    which = [i for i, c in enumerate(simulator.channels) if sensor(c).free_zero]
+    return np.eye(len(simulator.channels))[:, which]
+
+
+def _hand_over(
+    simulator: WindowSimulator,
+    model: mujoco.MjModel,
+    i: int,
+    trace: dict[str, Array],
+    states: list[State],
+) -> None:
+    """The state where the next window's simulation starts."""
+    w = simulator.windows[i]
+    following = [
+        k for k, v in enumerate(simulator.windows) if v.run == w.run and v.index == w.index + 1
+    ]
+    if not following:
+        return
+    at = round((simulator.windows[following[0]].start - w.start) / model.opt.timestep) - 1
+    at = min(max(at, 0), len(trace["qpos"]) - 1)
+    states[following[0]] = simulator.carrier.back(model, trace, at)

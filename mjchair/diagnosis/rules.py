@@ -1,0 +1,296 @@
+"""Every rule of the verdict, as small functions of plain numbers.
+
+In go the numbers of fits (chi2, standard errors, shares); out come decisions: what is tried, what
+is kept, what the verdict is. Nothing is simulated or fitted here, so a rule is tested on numbers.
+The thresholds were frozen on the development seeds of benchmarks/blind (README there).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# what a named effect must do
+CLOSES = 0.8  # share of the excess that a named effect closes
+PARTLY = 0.5  # share that an effect closes which is part of an answer, with a remainder
+CARRIED = 0.5  # share of the excess on held-out trials that it closes there
+PROBABLE = 0.95  # probability of a named effect
+HELD = 10.0  # chi2 that it must bring on runs that it was not fitted to
+SIGMAS = 4.0  # standard errors of a parameter away from neutral
+# what keeps a rival
+RIVAL_CHI2 = 10.0  # a rival this near, in chi2 with its penalty, is not ruled out
+RIVAL_ERRORS = 2.0  # nor one this near in paired standard errors over windows
+# how hypotheses grow and shrink
+MOST = 3  # effects that are added
+PENALTY = 10.0  # chi2 that a parameter must bring: log of the number of samples
+WORTH = 15.0  # chi2 that a further effect must bring besides the penalty of its parameters
+NEXT = 0.1  # share of the best linear gain by which a hypothesis that is fitted too may be behind
+TIE = 6.0  # chi2 within which hypotheses fit alike
+SURE = 6.0  # standard errors beyond which an effect is not tried without
+SHORT = 0.1  # share of the promise of the linear fit: a fit that misses more starts again elsewhere
+# the gap
+LEVEL = 0.01  # of the whole family of tests
+LEAST = 5.0  # standard deviations below which a null made elsewhere shows gaps as well
+SMALL_GAP = 2.0  # rms of the residual over the noise up to which a gap may be none that matters
+CERTAIN = 10.0  # standard errors beyond which an effect is named whatever its size
+MATERIAL = 0.12  # of the chair's own rolling resistance: a force that matters (assumption)
+# what happens once
+CARRIES = 0.8  # share of the gain
+FEW = 2  # windows of one run that carry that share: an event in time fits as well
+MANY = 5  # windows of a study in which few can be told from all
+# what is believed of a parameter
+SIZES = 5.0  # sizes worth finding: a standard error above tells nothing
+
+
+class Verdict(StrEnum):
+    """What a diagnosis says of a study."""
+
+    NONE = "none"
+    NAMED = "named"
+    AMBIGUOUS = "ambiguous"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldOut:
+    """Held-out trials: chi2 of the slow residual before and after, and its degrees of freedom."""
+
+    before: float
+    after: float
+    dof: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Standing:
+    """The numbers that the verdict on a choice of effects follows from.
+
+    Attributes:
+      closure: share of the excess that the effects close. gap_left: whether the gap test still
+        fails. gain_by_run, gain_by_manoeuvre: chi2 that they bring on each run, or manoeuvre, when
+        they are fitted to the others.
+      sigmas: of every effect, how far it is from neutral in standard errors.
+      at_bound: whether a parameter ended on a bound. rivals: effects that could stand in a place.
+      probability: of the effects. once: whether something that happened once fits as well.
+      runs: that were fitted to.
+      held_out: the trials that no fit saw; None where there are none.
+    """
+
+    closure: float
+    gap_left: bool
+    gain_by_run: float
+    gain_by_manoeuvre: float
+    sigmas: tuple[float, ...]
+    at_bound: bool
+    rivals: int
+    probability: float = 1.0
+    once: bool = False
+    runs: int = 2
+    held_out: HeldOut | None = None
+
+
+def gap_exists(p: float, sigmas: float) -> bool:
+    """Whether there is a gap worth a name.
+
+    Args:
+      p: of the family of all tests. sigmas: of the largest test.
+    """
+    return p < LEVEL and sigmas > LEAST
+
+
+def verdict(gap: bool, choice: Standing | None) -> Verdict:
+    """The verdict of a study.
+
+    Args:
+      gap: whether there is one. choice: the effects that explain it best; None: none brings a gain.
+    """
+    if not gap:
+        return Verdict.NONE
+    if choice is None or not explains(choice):
+        return Verdict.UNKNOWN
+    alone = not choice.rivals and not choice.once and choice.probability >= PROBABLE
+    # in a single run nothing tells an effect from what is left beside it
+    whole = not choice.gap_left or choice.runs > 1
+    named = sure(choice) and alone and whole and choice.closure >= CLOSES
+    return Verdict.NAMED if named else Verdict.AMBIGUOUS
+
+
+def explains(choice: Standing) -> bool:
+    """Whether the effects are an answer, alone or beside their rivals, with a remainder or not."""
+    if choice.closure < PARTLY or choice.gain_by_run < HELD:
+        return False
+    return choice.held_out is None or carries_over(choice.held_out)
+
+
+def carries_over(held: HeldOut) -> bool:
+    """Whether the held-out trials, which no fit has seen, do not speak against the effects.
+
+    A gap that shows in them must close by CARRIED; none must open.
+    """
+    scatter = 3.0 * math.sqrt(2.0 * held.dof)
+    gap, left = held.before - held.dof, held.after - held.dof
+    return left < max((1.0 - CARRIED) * gap, scatter) if gap > scatter else left < gap + scatter
+
+
+def sure(choice: Standing) -> bool:
+    """Whether every effect is clearly there, and shows in more than one manoeuvre."""
+    clear = all(s > SIGMAS for s in choice.sigmas)
+    return clear and not choice.at_bound and choice.gain_by_manoeuvre > 0.0
+
+
+def closure(
+    *, gained: float, left: float, excess: float, excess_std: float, excess_after: float,
+    excess_after_std: float,
+) -> float:  # fmt: skip
+    """Share of the excess that a fit closes, 0 to 1.
+
+    The excess is the slow part of the residual above what noise gives, where that is known well
+    enough; a small gap is below its scatter, and then what the fit gains is held against the most
+    that any further test shows.
+
+    Args:
+      gained: chi2 that the fit brings. left: chi2 above expectation of the largest test after it.
+      excess, excess_after: before and after, with their standard deviations.
+    """
+    share = gained / max(gained + max(left, 0.0), 1e-9)
+    if excess > 6.0 * excess_std:
+        share = min(share, 1.0 - max(excess_after - excess_after_std, 0.0) / excess)
+    return float(np.clip(share, 0.0, 1.0))
+
+
+def more_missing(choice: Standing, walls: int) -> bool:
+    """Whether an answer leaves something that is no noise.
+
+    Args:
+      walls: how many numbers that are only roughly known stand on their walls: they are where what
+        is missing pushed them.
+    """
+    return choice.gap_left or choice.closure < CLOSES or walls > 0
+
+
+def matters(
+    *, force: float, limit: float, gap: float, told: bool, said: Verdict, sigmas: float
+) -> bool:
+    """Whether a gap is one that matters.
+
+    Args:
+      force: the largest missing force, N. limit: below which none matters, N.
+      gap: rms of the residual over the noise. told: whether the person who asks gave the limit.
+      sigmas: of the least certain effect. Without a limit that was told, what is CERTAIN is named
+        whatever its size, and a gap of twice the noise is one though no force goes with it.
+    """
+    if force >= limit or said == Verdict.NONE:
+        return True
+    return not told and (gap >= SMALL_GAP or (said == Verdict.NAMED and sigmas > CERTAIN))
+
+
+def happened_once(gains: Array, runs: NDArray[np.int64]) -> bool:
+    """Whether so few windows of one run carry an effect that an event in time does as well.
+
+    Args:
+      gains: (windows,) chi2 that the effect brings. runs: (windows,) of which run each is.
+    """
+    total = float(gains.sum())
+    if gains.size < MANY or total <= 0.0:
+        return False
+    first = np.argsort(-gains)[:FEW]
+    mine = first[runs[first] == runs[first[0]]]
+    return float(gains[mine].sum()) > CARRIES * total
+
+
+def believable(*, std: float, change: float, width: float) -> bool:
+    """Whether a standard error tells more than bounds and typical sizes do.
+
+    Args:
+      change: a size worth finding. width: between the bounds.
+    """
+    return std < min(SIZES * change, width / math.sqrt(12.0))
+
+
+def needed(parameters: int) -> float:
+    """Chi2 that this many further parameters, of one more effect, must bring."""
+    return PENALTY * parameters + WORTH
+
+
+def worth_adding(*, gained: float, parameters: int, held: float) -> bool:
+    """Whether a larger hypothesis brings enough, on its own evidence.
+
+    Args:
+      gained: chi2 that it brings more. parameters: that it has more.
+      held: chi2 that it brings more on each run when it is fitted to the others.
+    """
+    return gained >= needed(parameters) and held >= HELD
+
+
+def worth_trying(*, score: float, best: float, gain: float) -> bool:
+    """Whether a hypothesis is fitted beside the best, which leaves a gap.
+
+    Args:
+      score, best: linear, of both. gain: chi2 of the best.
+    """
+    return best - score < max(NEXT * gain, RIVAL_CHI2)
+
+
+def starts_disagree(one: float, two: float) -> bool:
+    """Whether two fits of one hypothesis, by their chi2, end at different places."""
+    return abs(one - two) > WORTH
+
+
+def surely_needed(*, sigmas: float, lost: float, parameters: int) -> bool:
+    """Whether an effect need not be tried without: linear algebra already tells.
+
+    Args:
+      sigmas: of the effect. lost: chi2 that the others lose without it, by linear algebra.
+    """
+    return sigmas > SURE and lost > 3.0 * needed(parameters)
+
+
+def can_be_dropped(*, lost: float, parameters: int) -> bool:
+    """Whether the others lose too little chi2 without an effect of this many parameters."""
+    return lost < needed(parameters)
+
+
+def alike(score: float, best: float) -> bool:
+    """Whether two hypotheses fit alike, by their scores (chi2 gained less penalties)."""
+    return score > best - TIE
+
+
+def fell_short(*, total: float, promised: float, gain: float) -> bool:
+    """Whether a nonlinear fit misses so much of the linear promise that it starts again."""
+    return total - promised >= max(SHORT * gain, WORTH)
+
+
+def worth_refitting(*, behind: float, gain: float, rival_gain: float) -> bool:
+    """Whether a rival is near enough, by linear algebra, to be fitted.
+
+    Args:
+      behind: by how much its score is lower. gain, rival_gain: chi2 that chosen and rival bring.
+    """
+    if behind < RIVAL_CHI2:
+        return True
+    near = behind < 3.0 * RIVAL_ERRORS * math.sqrt(max(gain - rival_gain, 0.0))
+    return near and rival_gain > 0.8 * gain
+
+
+def stays_a_rival(*, behind: float, errors: float, beyond_bound: bool) -> bool:
+    """Whether a fitted rival is not ruled out.
+
+    Args:
+      behind: chi2 with penalties by which it fits worse. errors: the same in paired standard
+        errors over windows. beyond_bound: it alone would have to be larger than it can be.
+    """
+    return not beyond_bound and (behind < RIVAL_CHI2 or errors < RIVAL_ERRORS)
+
+
+def paired_errors(theirs: Array, ours: Array) -> float:
+    """By how many standard errors, over windows, `theirs` is worse; chi2 of each, (windows,)."""
+    difference = theirs - ours
+    if difference.size < 2:
+        return float(difference.sum())
+    spread = float(difference.std(ddof=1)) * math.sqrt(difference.size)
+    return float(difference.sum() / max(spread, 1e-9))

@@ -1,0 +1,1 @@
+"""The drive of a power chair: joystick, controller, motors, gears, parking brakes and battery."""

@@ -1,0 +1,1 @@
+"""Named physical effects; each one is an edit of an MjSpec."""

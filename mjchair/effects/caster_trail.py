@@ -1,0 +1,23 @@
+"""Casters whose wheels are further behind their stems, or nearer to them."""
+
+from __future__ import annotations
+
+import mujoco
+
+from mjchair.effects.effect import Effect, Parameter
+from mjchair.model import edits, parts
+
+
+def edit(spec: mujoco.MjSpec, length: float) -> None:
+    """Add `length` (m) to the trail of both casters."""
+    for caster in parts.CASTERS:
+        edits.add_trail(spec, caster, length)
+
+
+EFFECT = Effect(
+    name="caster_trail",
+    parameters=(Parameter("length", "m", 0.015, -0.04, 0.1),),
+    signature="swivel dynamics",
+    source="casters have 0.04-0.06 m of trail",
+    edit=edit,
+)

@@ -1,0 +1,27 @@
+"""The centre of mass of frame and occupant is not where the model has it."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from mjchair.effects.effect import Effect, Parameter
+from mjchair.model import inertials
+
+
+def edit(spec: mujoco.MjSpec, x: float, y: float) -> None:
+    """Move the centre of mass of body `chair` by `x`, `y` (m) in the chair's axes."""
+    body = inertials.explicit(spec, "chair")
+    body.ipos = np.asarray(body.ipos, float) + np.array([x, y, 0.0])
+
+
+EFFECT = Effect(
+    name="mass_offset",
+    parameters=(
+        Parameter("x", "m", 0.03, -0.3, 0.3),
+        Parameter("y", "m", 0.015, -0.2, 0.2),
+    ),
+    signature="load shift: yaw with longitudinal acceleration (y), understeer (x)",
+    source="a seated person leans a few centimetres",
+    edit=edit,
+)

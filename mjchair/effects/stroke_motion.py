@@ -1,0 +1,149 @@
+"""A body moves on the chair in step with the strokes; its motion was not measured.
+
+In: the specification of a chair, and the first moments of the harmonics of the motion, that is,
+the mass that moves times its forward displacement (kg m). Out: the same chair with the rider's
+upper body on a slide along the chair's x. The slide follows a sum of sines and cosines of the phase
+of the strokes, which the diagnosis takes from the pushes of every run (columns `stroke_sine_1`,
+`stroke_cosine_1` and so on, each within -1 to 1).
+
+Such data determine only the product of mass and displacement. The edit moves the mass of the upper
+body; half of this mass with twice the displacement has the same effect on the chair.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from mjchair.effects.effect import Effect, Parameter, Seed, Values, clip
+from mjchair.effects.rider_motion import DAMPING, FOLLOW
+from mjchair.model import inertials, moving_share, parts
+
+JOINT = "stroke_motion"
+HARMONICS = 3  # of the phase of the strokes
+WAVES = tuple(f"{wave}_{k}" for k in range(1, HARMONICS + 1) for wave in ("sine", "cosine"))
+COLUMNS = tuple(f"stroke_{wave}" for wave in WAVES)
+# Largest displacement of the common centre of trunk, head and arms from its mean in a stroke, m. A
+# trunk with its centre 0.3 m above the hips that bends by 20 deg to both sides of its mean moves by
+# 0.10 m; arms (a tenth of the person, a quarter of the moving mass) that swing by 0.2 m add 0.05 m.
+# Assumption.
+REACH = 0.15
+UPPER = 37.0  # kg: head, arms and trunk above the pelvis, 0.491 of 75 kg (de Leva 1996)
+CONFIDENCE = 1.96  # standard errors of a 95 % interval
+
+
+def waves(phase: float | np.ndarray) -> dict[str, np.ndarray]:
+    """The course of every column at a phase (rad) of the strokes."""
+    angle = np.asarray(phase, np.float64)
+    return {
+        f"stroke_{name}_{k}": wave(k * angle)
+        for k in range(1, HARMONICS + 1)
+        for name, wave in (("sine", np.sin), ("cosine", np.cos))
+    }
+
+
+def upper_body(spec: mujoco.MjSpec) -> float:
+    """Mass (kg) of the upper body; of a chair without a rider, half of the mass that can move."""
+    sitting = moving_share.person(spec)
+    return 0.5 * moving_share.most(spec) if sitting is None else sitting[0].mass
+
+
+def move(spec: mujoco.MjSpec, **moments: float) -> None:
+    """Let the rider's upper body move so that its first moment has these harmonics (kg m).
+
+    Raises:
+      MjchairError: a chair without a rider that could move.
+    """
+    if not any(moments.values()):
+        return
+    mass = upper_body(spec)
+    moving = moving_share.take(spec, mass)
+    chair = parts.named(spec.bodies, "chair", "body")
+    body = chair.add_body(name=JOINT, pos=moving.centre)
+    body.add_joint(name=JOINT, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1.0, 0.0, 0.0])
+    inertials.write(body, inertials.Inertial(mass, np.zeros(3), moving.tensor))
+    body.explicitinertial = True
+    for k, wave in enumerate(WAVES):
+        gain, bias = np.zeros(10), np.zeros(10)
+        gain[0] = FOLLOW**2 * moments.get(wave, 0.0)  # a spring's stiffness times displacement
+        if k == 0:  # the stiffness of the spring belongs to one actuator only
+            bias[1:3] = -mass * FOLLOW**2, -2.0 * DAMPING * mass * FOLLOW
+        spec.add_actuator(
+            name=f"stroke_{wave}",
+            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            target=JOINT,
+            gainprm=gain,
+            biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+            biasprm=bias,
+        )
+
+
+def first_moment(values: Mapping[str, float], std: Mapping[str, float]) -> tuple[float, float]:
+    """Half of the range of the first moment in a stroke, and its standard error, kg m."""
+    phase = np.linspace(0.0, 2.0 * math.pi, 361)
+    course = waves(phase)
+    total = np.sum([values[w] * course[f"stroke_{w}"] for w in WAVES], axis=0)
+    high, low = int(np.argmax(total)), int(np.argmin(total))
+    slopes = {w: 0.5 * float(np.diff(course[f"stroke_{w}"][[low, high]])[0]) for w in WAVES}
+    error = math.sqrt(sum((slopes[w] * std.get(w, 0.0)) ** 2 for w in WAVES))
+    return 0.5 * float(total[high] - total[low]), error
+
+
+def remark(values: Mapping[str, float], std: Mapping[str, float]) -> str:
+    """The meaning of the values, in one sentence."""
+    size, error = first_moment(values, std)
+    low, high = max(size - CONFIDENCE * error, 0.0), size + CONFIDENCE * error
+    return (
+        f"a body moves on the chair in step with the strokes: its mass times its displacement goes "
+        f"{size:.2f} kg m to both sides of its middle (95 %: {low:.2f} to {high:.2f}), such as "
+        f"30 kg by {100.0 * size / 30.0:.1f} cm or 15 kg by {100.0 * size / 15.0:.1f} cm; the mass "
+        "alone is not known"
+    )
+
+
+def _most(spec: mujoco.MjSpec) -> Values:
+    mass = upper_body(spec)
+    return {wave: mass * REACH / _order(wave) for wave in WAVES}
+
+
+def _least(spec: mujoco.MjSpec) -> Values:
+    return {wave: -value for wave, value in _most(spec).items()}
+
+
+def _order(wave: str) -> int:
+    return int(wave.rpartition("_")[2])
+
+
+PARAMETERS = tuple(
+    Parameter(w, "kg m", 0.0, -UPPER * REACH / _order(w), UPPER * REACH / _order(w), scale=0.5)
+    for w in WAVES
+)
+
+
+def _combined(coefficients: np.ndarray) -> Values:
+    return {
+        p.name: clip(p, p.change * float(c)) for p, c in zip(PARAMETERS, coefficients, strict=True)
+    }
+
+
+def _alone(parameter: Parameter) -> Values:
+    return {p.name: p.change if p is parameter else 0.0 for p in PARAMETERS}
+
+
+EFFECT = Effect(
+    name="rider_motion",
+    parameters=PARAMETERS,
+    signature="a body moves on the chair in step with the strokes",
+    source="bounds: trunk and arms of de Leva (1996), bent by 20 deg to both sides (assumption)",
+    edit=move,
+    seeds=(Seed(tuple(map(_alone, PARAMETERS)), _combined),),
+    measured=COLUMNS[0],
+    beside=True,
+    most=_most,
+    least=_least,
+    example={"sine_1": 1.5, "cosine_1": -1.0, "sine_2": 0.3},
+    remark=remark,
+)

@@ -1,0 +1,31 @@
+"""A drive (or a torque sensor) that gives more or less than it says."""
+
+from __future__ import annotations
+
+import mujoco
+
+from mjchair.effects.effect import Effect, Parameter
+from mjchair.model import parts
+
+
+def edit(spec: mujoco.MjSpec, left: float, right: float) -> None:
+    """Change the torque of the rear wheels' actuators by these fractions (1)."""
+    for wheel, change in zip(parts.REAR, (left, right), strict=True):
+        actuator = parts.named(spec.actuators, wheel, "actuator")
+        gain = list(actuator.gainprm)
+        gain[0] *= 1.0 + change
+        actuator.gainprm = gain
+
+
+EFFECT = Effect(
+    name="torque_gain",
+    parameters=(
+        Parameter("left", "1", 0.1, -0.9, 3.0),
+        Parameter("right", "1", 0.1, -0.9, 3.0),
+    ),
+    signature="yaw and thrust in proportion to torque",
+    source="uncalibrated torque sensors are within 10 %; assumed",
+    edit=edit,
+    driven=True,
+    drive=False,
+)

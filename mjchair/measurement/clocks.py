@@ -1,0 +1,252 @@
+"""The clocks of two instruments, put together by the motion that both have seen.
+
+In: two signals that go with one motion (a wheel's speed by two instruments, or its acceleration
+and an accelerometer), each on its own clock. Out: offset and drift of the second clock with their
+standard deviations, or the reason why they cannot be told.
+
+The offset is the lag of the largest correlation of the band-passed signals, refined by a parabola;
+its standard deviation is the Cramer-Rao bound of a delay in coloured noise. Strokes that come
+evenly make other lags nearly as good, a stroke aside: an alignment is clear only if chance would
+not put another lag that near. Drift is the slope of offsets of parts of the recording.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, correlate, sosfiltfilt
+
+from mjchair.errors import MjchairError
+
+Array = NDArray[np.float64]
+
+GRID = 100.0  # Hz, on which signals are compared
+BAND = (0.15, 8.0)  # Hz, of the motion of a wheelchair that is compared
+OVERLAP = 3.0  # s, the least part of two recordings that must lie together
+SHARE = 0.3  # of the shorter recording, the same
+LEAST = 0.6  # correlation below which two signals are not of one motion
+RIVAL = 0.15  # s, beyond which a lag is another one
+EVIDENCE = 5.0  # log likelihood ratio to the best other lag, below which a lag is not clear
+INDEPENDENT = 1.0  # independent samples a second of what two instruments see differently
+PART = 8.0  # s, of the parts whose offsets show drift
+NEAR = 0.25  # s, within which a part's offset is looked for
+AGREES = 0.1  # s, within which the offsets of parts agree
+FIVE = 5  # parts, fewer of which do not tell a drift
+MOST = 0.5  # share of the parts that must agree
+
+
+class Signal(NamedTuple):
+    """A signal on its own clock: time (n,) s and values (n,) or (n, k), in any unit."""
+
+    time: Array
+    values: Array
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """How another clock goes with the reference: t_reference = t + offset + drift * t.
+
+    Attributes:
+      offset: s. offset_std: s. drift: s a second, 0 where it does not show. drift_std: NaN where
+        the recording is too short to tell it. correlation: at that lag. rival: the best lag apart
+        from it, s, NaN without one. rival_correlation: there. clear: whether the lag is told.
+      how: in words.
+    """
+
+    offset: float
+    offset_std: float
+    drift: float = 0.0
+    drift_std: float = np.nan
+    correlation: float = np.nan
+    rival: float = np.nan
+    rival_correlation: float = np.nan
+    clear: bool = True
+    how: str = "given"
+
+    def to_reference(self, time: Array) -> Array:
+        """Times (n,) s of the other clock on the reference."""
+        return np.asarray(time + self.offset + self.drift * time)
+
+    def text(self) -> str:
+        """Offset and drift with their uncertainties."""
+        drift = ""
+        if np.isfinite(self.drift_std):
+            drift = f", drift {1e6 * self.drift:.0f} +- {1e6 * self.drift_std:.0f} ppm"
+        match = f", correlation {self.correlation:.2f}" if np.isfinite(self.correlation) else ""
+        spread = 1e3 * self.offset_std
+        return f"offset {self.offset:+.4f} s +- {spread:.1f} ms{drift} ({self.how}{match})"
+
+
+def align(reference: Signal, other: Signal, names: tuple[str, str] = ("one", "two")) -> Alignment:
+    """The alignment of two clocks by shared motion; see the module's docstring.
+
+    Raises:
+      MjchairError: recordings too short, no common motion, or a lag that is not clear; the line has
+        the best lags.
+    """
+    found = best_alignment(reference, other)
+    if not found.clear:
+        why = f"correlation {found.correlation:.2f} at {found.offset:+.2f} s"
+        if np.isfinite(found.rival):
+            why += f", {found.rival_correlation:.2f} at {found.rival:+.2f} s"
+        raise MjchairError(
+            f"the clocks of {names[0]} and {names[1]} cannot be aligned: {why}; give the offset "
+            f"of {names[1]} with --offset FILE={found.offset:.3f}, or leave the file out"
+        )
+    return found
+
+
+def best_alignment(reference: Signal, other: Signal) -> Alignment:
+    """The best lag there is, clear or not.
+
+    Raises:
+      MjchairError: a recording of less than 3 s.
+    """
+    one, two = _even(reference), _even(other)
+    if min(len(one.values), len(two.values)) < OVERLAP * GRID:
+        raise MjchairError(f"clocks need {OVERLAP:g} s of common motion to be aligned")
+    lags, match = _correlation(one.values, two.values)
+    best = int(np.argmax(match))
+    start = float(one.time[0] - two.time[0])
+    lag = _refined(lags, match, best) / GRID
+    apart = np.abs(lags - lags[best]) > RIVAL * GRID
+    peaks = np.r_[False, (match[1:-1] >= match[:-2]) & (match[1:-1] >= match[2:]), False] & apart
+    rival = int(np.flatnonzero(peaks)[np.argmax(match[peaks])]) if peaks.any() else -1
+    together = float(_together(len(one.values), len(two.values), int(lags[best]))) / GRID
+    rho = float(min(match[best], 1.0 - 1e-9))
+    other_rho = float(match[rival]) if rival >= 0 else 0.0
+    evidence = 0.5 * INDEPENDENT * together * np.log((1.0 - other_rho**2) / (1.0 - rho**2))
+    offset, drift, drift_std, agree = _drift(one, two, start + lag)
+    return Alignment(
+        offset=offset,
+        offset_std=_spread(one.values, rho, together),
+        drift=drift,
+        drift_std=drift_std,
+        correlation=rho,
+        rival=start + float(lags[rival]) / GRID if rival >= 0 else np.nan,
+        rival_correlation=other_rho if rival >= 0 else np.nan,
+        clear=rho >= LEAST and agree >= MOST and (rival < 0 or evidence >= EVIDENCE),
+        how="shared motion",
+    )
+
+
+def _even(signal: Signal) -> Signal:
+    """The signal on the common grid, band-passed, (m, k), with unit variance a column."""
+    time = np.arange(signal.time[0], signal.time[-1], 1.0 / GRID)
+    values = np.atleast_2d(signal.values.T).T
+    even = np.column_stack([np.interp(time, *_there(signal.time, v)) for v in values.T])
+    if len(even) > 4 * GRID / 10:
+        sos = butter(2, BAND, "bandpass", fs=GRID, output="sos")
+        even = sosfiltfilt(sos, even - even.mean(axis=0), axis=0, padlen=min(200, len(even) - 2))
+    return Signal(time, even)
+
+
+def _there(time: Array, values: Array) -> tuple[Array, Array]:
+    good = np.isfinite(values)
+    return time[good], values[good]
+
+
+def _correlation(one: Array, two: Array) -> tuple[NDArray[np.int64], Array]:
+    """Lags (samples) and the correlation of the first column of `one` with all columns of `two`.
+
+    With several columns it is the multiple correlation: the best sum of them at each lag.
+    """
+    first = one[:, 0]
+    full = len(first) + len(two) - 1
+    lags = np.arange(full) - (len(two) - 1)
+    count = _together(len(first), len(two), lags)
+    power = correlate(first**2, np.ones(len(two)), "full", "fft")
+    cross = np.column_stack([correlate(first, c, "full", "fft") for c in two.T])
+    squares = np.empty((full, two.shape[1], two.shape[1]))
+    for i in range(two.shape[1]):
+        for j in range(two.shape[1]):
+            squares[:, i, j] = correlate(np.ones(len(first)), two[:, i] * two[:, j], "full", "fft")
+    enough = count >= max(OVERLAP * GRID, SHARE * min(len(first), len(two)))
+    match = np.zeros(full)
+    small = 1e-9 * np.trace(squares[enough].mean(axis=0)) * np.eye(two.shape[1])
+    weights = np.linalg.solve(squares[enough] + small, cross[enough][..., None])[..., 0]
+    gained = np.sum(weights * cross[enough], axis=1)
+    match[enough] = np.sqrt(np.clip(gained / np.maximum(power[enough], 1e-30), 0.0, 1.0))
+    if two.shape[1] == 1:
+        match[enough] *= np.sign(cross[enough][:, 0])
+    return lags, match
+
+
+def _together(first: int, second: int, lag: NDArray[np.int64] | int) -> NDArray[np.int64] | int:
+    """Samples of two recordings that lie together at a lag."""
+    return np.asarray(np.minimum(first, np.asarray(lag) + second) - np.maximum(0, lag))
+
+
+def _refined(lags: NDArray[np.int64], match: Array, best: int) -> float:
+    if not 0 < best < len(match) - 1:
+        return float(lags[best])
+    left, middle, right = match[best - 1 : best + 2]
+    bend = left - 2.0 * middle + right
+    return float(lags[best] + (0.5 * (left - right) / bend if bend < 0.0 else 0.0))
+
+
+def _spread(values: Array, rho: float, together: float) -> float:
+    """Standard deviation of the lag, s: the Cramer-Rao bound, at least a tenth of a grid step."""
+    first = values[:, 0]
+    bandwidth = np.std(np.diff(first)) * GRID / max(float(np.std(first)), 1e-30)  # rad/s
+    noise = (1.0 - rho**2) / max(rho**2, 1e-6)
+    bound = np.sqrt(noise / (max(INDEPENDENT * together, 1.0) * bandwidth**2))
+    return float(max(bound, 0.1 / GRID))
+
+
+def _drift(one: Signal, two: Signal, offset: float) -> tuple[float, float, float, float]:
+    """Offset, drift and its standard deviation, and the share of the parts that agree.
+
+    Drift is 0 where it does not show, and its standard deviation NaN where too few parts tell it.
+    """
+    begin = max(one.time[0], two.time[0] + offset)
+    end = min(one.time[-1], two.time[-1] + offset)
+    count = int((end - begin) / PART)
+    if count < 3:
+        return offset, 0.0, np.nan, 1.0
+    middles, lags, spreads = [], [], []
+    for k in range(count):
+        window = begin + (k + np.array([0.0, 1.0])) * (end - begin) / count
+        lag, spread = _local_lag(one, two, offset, window)
+        if np.isfinite(lag):
+            middles.append(float(window.mean()) - offset)
+            lags.append(lag)
+            spreads.append(spread)
+    time, off = np.array(middles), np.array(lags)
+    if len(lags) < FIVE:
+        near = np.abs(off - np.median(off)) < AGREES if lags else np.zeros(0)
+        return offset, 0.0, np.nan, float(np.sum(near)) / count
+    terms = np.column_stack([np.ones_like(time), time])
+    fitted = np.linalg.lstsq(terms, off, rcond=None)[0]
+    left = off - terms @ fitted
+    scatter = max(float(np.sqrt(left @ left / (len(off) - 2))), float(np.median(spreads)))
+    spread = scatter * float(np.sqrt(np.linalg.inv(terms.T @ terms)[1, 1]))
+    agree = float(np.sum(np.abs(left - np.median(left)) < AGREES)) / count
+    if abs(fitted[1]) < 3.0 * spread:
+        return offset, 0.0, spread, agree
+    return offset + float(fitted[0]), float(fitted[1]), spread, agree
+
+
+def _local_lag(one: Signal, two: Signal, offset: float, window: Array) -> tuple[float, float]:
+    """How much more than `offset` a part is off, s, and its spread; NaN where it does not tell."""
+    inside = (one.time >= window[0]) & (one.time <= window[1])
+    first = one.values[inside, 0]
+    shifts = np.arange(-round(NEAR * GRID), round(NEAR * GRID) + 1)
+    match = np.zeros(shifts.size)
+    for i, shift in enumerate(shifts):
+        time = one.time[inside] - offset - shift / GRID
+        if time[0] < two.time[0] or time[-1] > two.time[-1]:
+            continue
+        columns = np.column_stack([np.interp(time, two.time, c) for c in two.values.T])
+        fit = columns @ np.linalg.lstsq(columns, first, rcond=None)[0]
+        match[i] = float(first @ fit) / max(
+            float(np.linalg.norm(first) * np.linalg.norm(fit)), 1e-30
+        )
+    best = int(np.argmax(match))
+    if match[best] < LEAST or best in (0, shifts.size - 1):
+        return np.nan, np.nan
+    spread = _spread(first[:, None], min(float(match[best]), 1.0 - 1e-9), PART)
+    return _refined(shifts, match, best) / GRID, spread

@@ -1,0 +1,219 @@
+"""Exports of instruments, by a mapping of their column names: IMUs, and any other table.
+
+In: a delimited file with a header, and TOML files that say what its columns are. Out: an `Export`,
+in SI. Mappings of NGIMU, x-IMU, x-IMU3 and Xsens come along in the folder `formats`; a mapping
+of your own has the same keys:
+
+    kind = "imu"                      # or "table"
+    has = ["Time (s)", "Gyr X"]       # columns that tell this format from others
+    preamble = "Make"                 # optional: a word in the lines before the header
+    time = { column = "Time (s)", unit = "s" }    # or { rate = 100.0 }, or { column, unit, wraps }
+    gyroscope = { columns = ["Gyr X", "Gyr Y", "Gyr Z"], unit = "deg/s" }
+    accelerometer = { columns = ["Acc X", "Acc Y", "Acc Z"], unit = "g" }
+    trigger = "Sync"                  # optional: a column that rises when the others start
+    [columns]                         # of a table: study column = where it is found
+    left_wheel_speed = { column = "omega L", unit = "deg/s", sign = -1 }
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from msgspec import Meta, Struct
+from numpy.typing import NDArray
+
+from mjchair.errors import MjchairError, nearest
+from mjchair.measurement.delimited import Delimited
+from mjchair.toml_file import read_toml
+from mjchair.units import UNITS
+
+Array = NDArray[np.float64]
+
+FORMATS = Path(__file__).with_name("formats")
+CLOCKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "100us": 1e-4}  # s a count; "samples": see its rate
+Positive = Annotated[float, Meta(gt=0)]
+
+
+class _Clock(Struct, forbid_unknown_fields=True):
+    """time: a column with its unit, or a rate."""
+
+    column: str | None = None
+    unit: Literal["s", "ms", "us", "100us", "samples"] = "s"
+    rate: Positive | None = None
+    wraps: Positive | None = None
+
+
+class _Vector(Struct, forbid_unknown_fields=True):
+    """gyroscope, accelerometer: three columns with one unit."""
+
+    columns: tuple[str, str, str]
+    unit: str
+
+
+class _Column(Struct, forbid_unknown_fields=True):
+    """One of [columns]."""
+
+    column: str
+    unit: str = "1"
+    sign: float = 1.0
+
+
+class ColumnMapping(Struct, forbid_unknown_fields=True):
+    """What the TOML file of a mapping says; see the module's docstring."""
+
+    kind: Literal["imu", "table"]
+    has: Annotated[list[str], Meta(min_length=1)]
+    time: _Clock
+    preamble: str = ""
+    gyroscope: _Vector | None = None
+    accelerometer: _Vector | None = None
+    trigger: str | None = None
+    columns: dict[str, _Column] = {}
+
+
+@dataclass(frozen=True)
+class Format:
+    """What the columns of an export are; see the module's docstring.
+
+    Attributes:
+      name: of the format. mapping: what its file says.
+    """
+
+    name: str
+    mapping: ColumnMapping
+
+    def fits(self, file: Delimited) -> bool:
+        """Whether a file is of this format."""
+        names = {_plain(column) for column in file.header}
+        word = self.mapping.preamble
+        return all(_plain(c) in names for c in self.mapping.has) and any(
+            word.lower() in line.lower() for line in (*file.preamble, "" if word else " ")
+        )
+
+
+@dataclass(frozen=True)
+class Export:
+    """One instrument's export, SI, on its own clock.
+
+    Attributes:
+      time: (n,), s, strictly increasing, 0 at the first sample. gyroscope, accelerometer: (n, 3),
+        rad/s and m/s^2 in the instrument's axes; None: it has none. columns: study column -> (n,).
+      trigger: time at which the trigger rises, s; None: it has none.
+      format: its name. source: the file. notes: what was noticed, one line each.
+    """
+
+    time: Array
+    gyroscope: Array | None
+    accelerometer: Array | None
+    columns: dict[str, Array]
+    trigger: float | None
+    format: str
+    source: str
+    notes: tuple[str, ...] = field(default=())
+
+
+def read_formats(own: Sequence[Path] = ()) -> list[Format]:
+    """The mappings in files of one's own, then those that come along.
+
+    Raises:
+      MjchairError: a file that cannot be read or lacks a key.
+    """
+    return [_format(path) for path in (*own, *sorted(FORMATS.glob("*.toml")))]
+
+
+def _format(path: Path) -> Format:
+    mapping = read_toml(path, ColumnMapping)
+    clock = mapping.time
+    if clock.rate is None and (clock.column is None or clock.unit == "samples"):
+        raise MjchairError(f"{path}: time needs a column with a unit of time, or a rate in Hz")
+    return Format(path.stem, mapping)
+
+
+def matching(file: Delimited, formats: Sequence[Format]) -> Format | None:
+    """The first format that a file is of."""
+    return next((one for one in formats if file.header and one.fits(file)), None)
+
+
+def read_export(file: Delimited, form: Format) -> Export:
+    """What a file of a format holds.
+
+    Raises:
+      MjchairError: a column or a unit that is not there, or a clock that stands still.
+    """
+    notes: list[str] = []
+    time = _time(file, form)
+    good = np.isfinite(time)
+    steps = np.r_[True, np.diff(time[good]) > 0.0]
+    kept = np.flatnonzero(good)[steps]
+    if kept.size < 2:
+        raise MjchairError(f"{file.source}: its clock stands still; is the time column right?")
+    if kept.size < time.size:
+        lost = time.size - kept.size
+        notes.append(f"{Path(file.source).name}: {lost} rows repeat a time or have none; left out")
+    time = time[kept] - time[kept[0]]
+    columns = {name: _one(file, entry, form)[kept] for name, entry in form.mapping.columns.items()}
+    return Export(
+        time=time,
+        gyroscope=_vector(file, form, form.mapping.gyroscope, kept),
+        accelerometer=_vector(file, form, form.mapping.accelerometer, kept),
+        columns=columns,
+        trigger=_trigger(file, form, time, kept),
+        format=form.name,
+        source=file.source,
+        notes=tuple(notes),
+    )
+
+
+def _plain(name: str) -> str:
+    return " ".join(name.lower().split())
+
+
+def _column(file: Delimited, name: str) -> Array:
+    names = [_plain(column) for column in file.header]
+    if _plain(name) not in names:
+        raise MjchairError(f"{file.source}: no column {name!r}" + nearest(name, file.header))
+    return file.values[:, names.index(_plain(name))]
+
+
+def _time(file: Delimited, form: Format) -> Array:
+    clock = form.mapping.time
+    rate = math.nan if clock.rate is None else clock.rate
+    if clock.column is None:
+        return np.arange(len(file.values)) / rate
+    time = _column(file, clock.column)
+    if clock.wraps is not None:
+        time = np.unwrap(time, period=clock.wraps)
+    return np.asarray(time * (1.0 / rate if clock.unit == "samples" else CLOCKS[clock.unit]))
+
+
+def _factor(unit: str, form: Format) -> float:
+    if unit not in UNITS:
+        raise MjchairError(f"mapping {form.name}: unknown unit {unit!r}" + nearest(unit, UNITS))
+    return UNITS[unit][1]
+
+
+def _one(file: Delimited, entry: _Column, form: Format) -> Array:
+    return _factor(entry.unit, form) * entry.sign * _column(file, entry.column)
+
+
+def _vector(
+    file: Delimited, form: Format, vector: _Vector | None, kept: NDArray[np.int64]
+) -> Array | None:
+    if vector is None:
+        return None
+    values = np.column_stack([_column(file, name) for name in vector.columns])[kept]
+    return np.asarray(_factor(vector.unit, form) * values)
+
+
+def _trigger(file: Delimited, form: Format, time: Array, kept: NDArray[np.int64]) -> float | None:
+    if form.mapping.trigger is None:
+        return None
+    values = _column(file, form.mapping.trigger)[kept]
+    low, high = np.nanmin(values), np.nanmax(values)
+    rises = np.flatnonzero(np.diff((values > 0.5 * (low + high)).astype(int)) > 0)
+    return float(time[rises[0] + 1]) if high > low and rises.size else None

@@ -1,0 +1,59 @@
+"""Free rolling in a run whose torque was not measured.
+
+In: the speed of a wheel over time. Out: the parts in which the chair only slows, evenly. Between
+two pushes a hand is off the rim for less than a second, and trunk and arms move all the time, so a
+part counts from 1.5 s on.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+Array = NDArray[np.float64]
+
+SHORTEST = 1.5  # s
+SLOWEST = 0.5  # rad/s: slower, and a chair may be held
+RADIUS = 0.3  # m, to speak of acceleration in m/s^2
+GAINS = 0.06  # m/s^2, above which something drives; a bump gives less over a quarter of a second
+BRAKES = 1.0  # m/s^2, beyond which something brakes
+EVEN = 0.20  # m/s^2, within which a coast's deceleration stays about its middle
+CUTOFF = 2.0  # Hz, of the speed that is judged
+MARGIN = 0.15  # s, left out at both ends
+
+
+def coasts(time: Array, speed: Array) -> list[tuple[float, float]]:
+    """Begin and end (s) of the parts of a run in which the wheel rolls freely.
+
+    Args:
+      time: (n,), s. speed: (n,), rad/s, forward or backward.
+    """
+    step = float(np.median(np.diff(time)))
+    even = np.arange(time[0], time[-1], max(step, 0.005))
+    rate = 1.0 / float(even[1] - even[0])
+    values = np.interp(even, time, speed)
+    sos = butter(2, min(CUTOFF, 0.4 * rate), fs=rate, output="sos")
+    smooth = sosfiltfilt(sos, values, padlen=min(100, even.size - 2))
+    gained = RADIUS * np.gradient(np.abs(smooth), even)
+    free = (gained < GAINS) & (gained > -BRAKES) & (np.abs(smooth) > SLOWEST)
+    found = []
+    for first, last in _runs(free):
+        found += _even_parts(even, gained, first, last)
+    return found
+
+
+def _runs(flag: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.r_[False, flag, False].astype(int)))
+    return list(zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True))
+
+
+def _even_parts(time: Array, gained: Array, first: int, last: int) -> list[tuple[float, float]]:
+    """The longest part about whose middle the deceleration stays even, if that is long enough."""
+    begin, end = time[first] + MARGIN, time[last] - MARGIN
+    inside = (time >= begin) & (time <= end)
+    if end - begin < SHORTEST or not inside.any():
+        return []
+    off = np.abs(gained - np.median(gained[inside])) > EVEN
+    parts = [(a, b) for a, b in _runs(inside & ~off) if time[b] - time[a] >= SHORTEST]
+    return [(float(time[a]), float(time[b])) for a, b in parts]

@@ -1,0 +1,210 @@
+"""People's own files into a study: the whole way.
+
+In: a folder of instruments' files, and what a person knows of chair, rider and floor. Out: the
+files of a study folder as text, the trials for a picture, and a line for everything found out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.errors import MjchairError, nearest
+from mjchair.measurement.gather.coasts import coasts
+from mjchair.measurement.gather.instruments import (
+    RIDER_COLUMNS,
+    ReadsMarkers,
+    read_instruments,
+)
+from mjchair.measurement.gather.join import GatheredTrial, join
+from mjchair.measurement.gather.known import Known
+from mjchair.measurement.gather.sources import Source, find_sources
+from mjchair.measurement.gather.study_file import study_text
+from mjchair.measurement.gather.without_torque import estimated
+
+Array = NDArray[np.float64]
+
+QUIET = 0.5  # s at rest, the least from which noise is read
+RESTS = 0.05  # rad/s of a wheel, below which the chair stands
+STEP = 2.0 * np.pi / 4096  # rad, of the encoders in use
+RUNS_OFF_FLOOR = ("rollers",)  # floors on which the chair itself does not move
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """A study made of people's own files.
+
+    Attributes:
+      files: name -> text, of the study folder. trials: as they stand in it. noise: channel ->
+        standard deviation at rest, SI. notes: what was found out. unused: files, and why.
+      asked: what cannot be known from the files, with its flag.
+    """
+
+    files: Mapping[str, str]
+    trials: tuple[GatheredTrial, ...]
+    noise: Mapping[str, float]
+    notes: tuple[str, ...]
+    unused: tuple[str, ...]
+    asked: tuple[str, ...]
+
+
+def gather(
+    folder: Path,
+    known: Known | None = None,
+    mappings: Sequence[Path] = (),
+    offsets: Mapping[str, float] | None = None,
+    of_markers: ReadsMarkers | None = None,
+) -> Gathered:
+    """Make a study of the files in a folder.
+
+    Args:
+      folder: with the files. known: of chair, rider and floor. mappings: TOML files of one's own,
+        see mjchair.measurement.exports. offsets: file -> s, added to its clock. of_markers: makes
+        the table of a rider's motion of a file of markers and the static trial beside it; None:
+        files of markers are named and left out.
+
+    Raises:
+      MjchairError: no file that can be used, one that is broken, clocks that cannot be aligned.
+    """
+    known = known or Known()
+    found = find_sources(folder, mappings)
+    sources = _with_offsets(found.sources, offsets or {})
+    instruments = read_instruments(sources, of_markers)
+    names = list(dict.fromkeys(one.source.trial for one in instruments))
+    if not names:
+        raise MjchairError(
+            f"{folder}: no wheel, no sensor on the frame and no markers among its files"
+        )
+    trials = []
+    for name in names:
+        trial = join(name, [one for one in instruments if one.source.trial == name])
+        trials += _usable(_for_floor(trial, known), known)
+    if not trials:
+        raise MjchairError(f"{folder}: no trial with a motion that a study can use")
+    noise = _noise(trials)
+    notes = [*dict.fromkeys(note for trial in trials for note in trial.notes)]
+    notes += [
+        f"{s.path.name}: on the person's body; not used here" for s in sources if s.place == "body"
+    ]
+    if of_markers is None:
+        notes += [_about_markers(s) for s in sources if s.kind == "markers"]
+    radius = next((one.radius for one in instruments if one.radius is not None), None)
+    text = study_text(trials, noise, known, radius)
+    files = {"study.toml": text} | {f"{t.name}.csv": table_text(t) for t in trials}
+    asked = known.missing(radius)
+    return Gathered(files, tuple(trials), noise, tuple(notes), found.unused, asked)
+
+
+def _about_markers(source: Source) -> str:
+    name = source.path.name
+    return f"{name}: markers; `mjchair rider {name}` makes the rider's motion of them"
+
+
+def _with_offsets(sources: Sequence[Source], offsets: Mapping[str, float]) -> list[Source]:
+    names = [s.path.name for s in sources]
+    for name in offsets:
+        if name not in names:
+            raise MjchairError(f"--offset {name}: no such file" + nearest(name, names))
+    return [replace(s, offset=offsets.get(s.path.name, s.offset)) for s in sources]
+
+
+def _for_floor(trial: GatheredTrial, known: Known) -> GatheredTrial:
+    """Without the channels that a chair which stays in place does not have."""
+    if known.floor not in RUNS_OFF_FLOOR:
+        return trial
+    gone = [n for n in trial.columns if n.startswith(("imu_", "position", "velocity", "heading"))]
+    if not gone:
+        return trial
+    said = f"{trial.name}: on rollers the chair stays in place; {', '.join(gone)} left out"
+    left = {n: v for n, v in trial.columns.items() if n not in gone}
+    return replace(trial, columns=left, notes=(*trial.notes, said))
+
+
+def _usable(trial: GatheredTrial, known: Known) -> list[GatheredTrial]:
+    """The trial, or without torque its free rolling; else the trial with a torque estimated."""
+    if trial.driven:
+        return [trial]
+    motion = next((one for one in trial.instruments if one.speed is not None), None)
+    if motion is None or motion.speed is None:
+        said = f"{trial.name}: no wheel's motion; it is taken as a coast throughout"
+        return [replace(trial, notes=(*trial.notes, said))]
+    parts = coasts(motion.time, motion.speed)
+    rolling = float(np.mean(np.abs(motion.speed) > 0.5)) * float(np.ptp(motion.time))
+    total = sum(end - begin for begin, end in parts)
+    if any(one.free is not None for one in trial.instruments) or total > 0.9 * rolling:
+        return [trial]  # an instrumented rim without a hand on it, or a coast from end to end
+    if not parts:
+        return [estimated(trial, motion, known)]
+    said = (
+        f"{trial.name}: no torque was measured, and it is pushed; its {len(parts)} free-rolling "
+        f"parts ({total:.1f} s) are used alone, each as a coast"
+    )
+    return [
+        _cut(trial, f"{trial.name}_coast{k}", (a - trial.begin, b - trial.begin), said)
+        for k, (a, b) in enumerate(parts, start=1)
+    ]
+
+
+def _cut(trial: GatheredTrial, name: str, span: tuple[float, float], said: str) -> GatheredTrial:
+    inside = (trial.time >= span[0]) & (trial.time <= span[1])
+    columns = {n: v[inside] for n, v in trial.columns.items() if np.isfinite(v[inside]).any()}
+    time = trial.time[inside]
+    return replace(
+        trial, name=name, time=time, columns=columns, manoeuvre="coast", notes=(*trial.notes, said)
+    )
+
+
+def _noise(trials: Sequence[GatheredTrial]) -> dict[str, float]:
+    """Standard deviation of each channel where the chair stands, the median over trials."""
+    seen: dict[str, list[float]] = {}
+    for trial in trials:
+        for begin, end in _rests(trial):
+            for name, values in trial.columns.items():
+                if name in ("left_wheel", "right_wheel", *RIDER_COLUMNS):
+                    continue
+                inside = (trial.time >= begin) & (trial.time <= end) & np.isfinite(values)
+                if inside.sum() > 10:
+                    seen.setdefault(name, []).append(_scatter(values[inside]))
+    out = {}
+    for name, sizes in seen.items():
+        least = STEP / np.sqrt(12.0) if name.endswith("_angle") else 0.0
+        size = max(float(np.median(sizes)), least)
+        if size > 0.0:
+            out[name] = float(f"{size:.2g}")
+    return out
+
+
+def _scatter(values: Array) -> float:
+    """Standard deviation of what is left of a straight line."""
+    line = np.linspace(-1.0, 1.0, values.size)
+    terms = np.column_stack([np.ones_like(line), line])
+    return float(np.std(values - terms @ np.linalg.lstsq(terms, values, rcond=None)[0]))
+
+
+def _rests(trial: GatheredTrial) -> list[tuple[float, float]]:
+    """Begin and end (s) of the parts in which every wheel stands."""
+    motions = [one for one in trial.instruments if one.speed is not None]
+    motions = [one for one in motions if one.ground is None] or motions
+    if not motions:
+        return []
+    still = np.ones(trial.time.size, bool)
+    for one in motions:
+        assert one.speed is not None
+        still &= np.abs(np.interp(trial.time, one.time - trial.begin, one.speed)) < RESTS
+    edges = np.flatnonzero(np.diff(np.r_[False, still, False].astype(int)))
+    spans = [
+        (trial.time[a], trial.time[b - 1]) for a, b in zip(edges[::2], edges[1::2], strict=True)
+    ]
+    return [(float(a), float(b)) for a, b in spans if b - a >= QUIET]
+
+
+def table_text(trial: GatheredTrial) -> str:
+    """A trial's table as CSV, SI, an empty cell where a sample is missing."""
+    header = ",".join(["time", *trial.columns])
+    rows = np.column_stack([trial.time, *trial.columns.values()]).tolist()
+    lines = [",".join("" if x != x else f"{x:.7g}" for x in row) for row in rows]
+    return "\n".join([header, *lines]) + "\n"

@@ -1,0 +1,334 @@
+"""One instrument's file as channels of a chair, in forward signs, on the instrument's own clock.
+
+In: a `Source`. Out: an `Instrument`. The signs of instrumented wheels are weighed over all files of
+a wheel, because one file may roll backwards or hold no push.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from mjchair.errors import MjchairError
+from mjchair.measurement import baseline as baselines
+from mjchair.measurement import imu, smartwheel
+from mjchair.measurement.exports import read_export
+from mjchair.measurement.gather.sources import Source
+from mjchair.measurement.smartwheel import Orientation, PushRim
+from mjchair.rider.anatomy import JOINT_NAMES
+from mjchair.simulation.table import Table, read_table
+
+Array = NDArray[np.float64]
+
+OTHER = {"left": "right", "right": "left"}
+COAST = 0.98  # share of a rolling recording without a hand, above which it is a coast
+SMOOTH = 0.1  # s, of the local parabola that turns a table's angle into speed
+CHAIR_SPEED = "chair_speed"  # m/s, a column of a rider's motion
+RIDER_COLUMNS = {*JOINT_NAMES, "rider_motion", CHAIR_SPEED}
+RADIUS = 0.3  # m, of a rear wheel where nothing tells it: 24 inches
+SEEN = 0.7  # share of the time below which it is said how little of the chair is seen
+# a file of markers and the static trial beside it -> the table of the rider's motion, and notes
+ReadsMarkers = Callable[[Path, Path | None], tuple[Table, Sequence[str]]]
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """What one instrument measured.
+
+    Attributes:
+      name: of its file, for lines and legends. source: the file. time: (n,), s, its own clock.
+      channels: study channel -> (n,), NaN where a sample is missing. torque: wheel -> (n,), N m.
+      speed: (n,) rad/s of a wheel, forward, that shows the motion; None. side: of that wheel.
+      gyroscope, accelerometer: (n, 3) of a sensor on the frame, in its own axes; None.
+      trigger: time at which its trigger rises, s; None. free: (n,), without a hand; None.
+      radius: of the wheel, m, from the file; None. ground: (n,) m/s, of the chair over the floor,
+        by markers; None. notes: one line each.
+    """
+
+    name: str
+    source: Source
+    time: Array
+    channels: Mapping[str, Array] = field(default_factory=dict)
+    torque: Mapping[str, Array] = field(default_factory=dict)
+    speed: Array | None = None
+    side: str = ""
+    gyroscope: Array | None = None
+    accelerometer: Array | None = None
+    trigger: float | None = None
+    free: NDArray[np.bool_] | None = None
+    radius: float | None = None
+    ground: Array | None = None
+    notes: tuple[str, ...] = ()
+
+
+def read_instruments(
+    sources: Sequence[Source], of_markers: ReadsMarkers | None = None
+) -> list[Instrument]:
+    """Every file that is no baseline, as an instrument.
+
+    Args:
+      of_markers: makes the table of a rider's motion of a file of markers; None: such files are
+        left out.
+
+    Raises:
+      MjchairError: as the readers do, two files of one wheel in one trial, or a file of an
+        untouched rim without one of the rim in use.
+    """
+    wheels = _wheels([s for s in sources if s.kind == "smartwheel"])
+    others = [_imu(s) for s in sources if s.kind == "imu" and s.place != "body"]
+    tables = [_table(s) for s in sources if s.kind == "table"]
+    markers = [s for s in sources if s.kind == "markers" and not s.still]
+    riders = [_rider(s, *of_markers(s.path, _still(s, sources))) for s in markers if of_markers]
+    return [*wheels, *others, *tables, *riders]
+
+
+def _still(source: Source, sources: Sequence[Source]) -> Path | None:
+    """The static trial of markers whose name is nearest to a run's; None without one."""
+    rests = [s for s in sources if s.kind == "markers" and s.still]
+    words = set(source.trial.split("_"))
+    best = max(rests, key=lambda s: len(words & set(s.trial.split("_"))), default=None)
+    return None if best is None else best.path
+
+
+def _rider(source: Source, table: Table, notes: Sequence[str] = ()) -> Instrument:
+    """The motion of a rider: joints (rad), centre of mass (m), and the chair's speed (m/s)."""
+    time, columns = np.asarray(table.time), dict(table.columns)
+    ground = columns.pop(CHAIR_SPEED, None)
+    name = source.path.name
+    said = [f"{name}: {note}" for note in notes]
+    told = sum(column in JOINT_NAMES for column in columns)
+    said.append(f"{name}: motion of the rider, {told} of {len(JOINT_NAMES)} joints told")
+    speed = None
+    if ground is not None:
+        there = np.isfinite(ground)
+        if there.mean() < SEEN:
+            said.append(f"{name}: the chair is seen in {there.mean():.0%} of the time")
+        # a wheel of the usual radius; clocks are put together by its course alone
+        speed = np.interp(time, time[there], ground[there]) / RADIUS
+    return Instrument(name, source, time, columns, speed=speed, ground=ground, notes=tuple(said))
+
+
+def _wheels(sources: list[Source]) -> list[Instrument]:
+    runs = [(s, smartwheel.read_smartwheel(s.path)) for s in sources if not s.baseline]
+    rests = [(s, smartwheel.read_smartwheel(s.path)) for s in sources if s.baseline]
+    if rests and not runs:
+        raise MjchairError(
+            f"{rests[0][0].path}: a recording of an untouched rim, and none of the rim in use; "
+            f"name it without {sorted(baselines_words())[0]!r} if it is one"
+        )
+    signs = [smartwheel.orientation(run) for _, run in runs]
+    named = _sides([s for s, _ in runs], signs)
+    found = []
+    for side in ("left", "right"):
+        mine = [i for i, (given, _) in enumerate(named) if given == side]
+        joint = _joint([signs[i] for i in mine], [runs[i][1] for i in mine])
+        for i in mine:
+            source, run = runs[i]
+            rest = _rest(source, side, rests, single=len({s for s, _ in named}) == 1)
+            found.append(_wheel(source, run, (side, joint, named[i][1]), rest))
+    return found
+
+
+def baselines_words() -> set[str]:
+    """The words that make a file a recording of an untouched rim."""
+    from mjchair.measurement.gather.sources import BASELINE
+
+    return BASELINE
+
+
+def _sides(sources: list[Source], signs: list[Orientation]) -> list[tuple[str, str]]:
+    """The side of every wheel's file, and a note where it is not its name that tells."""
+    out: list[tuple[str, str]] = []
+    for i, source in enumerate(sources):
+        beside = [k for k, s in enumerate(sources) if s.trial == source.trial and k != i]
+        told = [sources[k].side for k in beside if sources[k].side]
+        if source.side:
+            side, why = source.side, ""
+            if signs[i].side == OTHER[side]:
+                why = f"its name says {side}; its signs are those of a {OTHER[side]} wheel"
+        elif told:
+            side, why = OTHER[told[0]], f"taken as the {OTHER[told[0]]} wheel: the other is named"
+        elif signs[i].side:
+            side, why = signs[i].side, f"its signs are those of a {signs[i].side} wheel"
+        else:
+            side = "left" if not beside or i < min(beside) else "right"
+            why = f"neither name nor signs tell its side; taken as {side}, say it in gather.toml"
+        twins = [k for k in beside if k < i and out[k][0] == side]
+        if twins:
+            raise MjchairError(
+                f"{source.path.name} and {sources[twins[0]].path.name} are both of the {side} "
+                f"wheel in trial {source.trial!r}; name left and right, or say it in gather.toml"
+            )
+        out.append((side, why))
+    return out
+
+
+def _joint(signs: Sequence[Orientation], runs: Sequence[PushRim]) -> Orientation:
+    """The signs of one wheel from all its files: pushes tell, and what rolls furthest."""
+    if not signs:
+        return Orientation(1, 1, "", False)
+    clear = [i for i, s in enumerate(signs) if s.clear]
+    which = clear or range(len(signs))
+    net = sum(float(runs[i].angle[-1] - runs[i].angle[0]) for i in which)
+    travel = -1 if net < 0.0 else 1
+    work = sum(smartwheel.moment_work(runs[i]) * travel for i in clear)
+    return Orientation(travel, -1 if work < 0.0 else 1, "", bool(clear))
+
+
+def _rest(
+    source: Source, side: str, rests: list[tuple[Source, PushRim]], single: bool
+) -> PushRim | None:
+    """The recording of the untouched rim of that side whose name is nearest."""
+    mine = [(s, run) for s, run in rests if s.side == side or (not s.side and single)]
+    if not mine:
+        return None
+    words = set(source.trial.split("_"))
+    return max(mine, key=lambda one: len(words & set(one[0].trial.split("_"))))[1]
+
+
+def _wheel(
+    source: Source, run: PushRim, told: tuple[str, Orientation, str], rest: PushRim | None
+) -> Instrument:
+    """An instrumented wheel: angle, and the hand's torque where there was a hand."""
+    side, signs, why = told
+    base = baselines.choose(run, rest)
+    free = baselines.hands_off(run)
+    clean = smartwheel.turned(baselines.take_off(run, base), signs)
+    name = source.path.name
+    notes = [
+        *run.notes,
+        f"{name}: {side} wheel; {_signs_text(signs)}" + (f"; {why}" if why else ""),
+    ]
+    size = float(np.hypot(base.cosine[:2], base.sine[:2]).max())
+    notes.append(
+        f"{name}: offset {base.offset[5]:+.2f} N m and rim's weight {size:.1f} N once a turn taken "
+        f"off by {base.how}; {base.left[5]:.2f} N m is left"
+    )
+    if clean.angle[-1] - clean.angle[0] < -smartwheel.ROLLS:
+        notes.append(f"{name}: rolls backwards on balance")
+    rolling = np.abs(clean.speed) > 0.3
+    torque = {f"{side}_wheel": clean.torque}
+    if rolling.any() and free[rolling].mean() > COAST:
+        torque = {}
+        notes.append(f"{name}: no hand on the rim; a coast, its torque is left out")
+    return Instrument(
+        name=name,
+        source=source,
+        time=np.asarray(clean.time),
+        channels={f"{side}_wheel_angle": np.where(clean.there, clean.angle, np.nan)},
+        torque=torque,
+        speed=clean.speed,
+        side=side,
+        free=free,
+        radius=_radius(clean),
+        notes=tuple(notes),
+    )
+
+
+def _signs_text(signs: Orientation) -> str:
+    way = "counts down" if signs.travel < 0 else "counts up"
+    drive = "Mz < 0 drives forward" if signs.moment < 0 else "Mz > 0 drives forward"
+    return f"{way} as it rolls forward, {drive}" + ("" if signs.clear else " (no push tells it)")
+
+
+def _radius(run: PushRim) -> float | None:
+    """The radius that the instrument was set to, from its own speed column; m."""
+    fast = np.abs(run.speed) > 1.0
+    if fast.sum() < 100:
+        return None
+    radius = float(np.abs(run.ground_speed[fast]) @ np.abs(run.speed[fast]))
+    radius /= float(run.speed[fast] @ run.speed[fast])
+    return radius if 0.15 < radius < 0.5 else None
+
+
+def _imu(source: Source) -> Instrument:
+    """An inertial sensor on a wheel or on the frame; its own axes are kept for the frame."""
+    assert source.file is not None and source.format is not None
+    export = read_export(source.file, source.format)
+    name = _short(source.path)
+    gyroscope, notes = export.gyroscope, list(export.notes)
+    if gyroscope is None:
+        raise MjchairError(f"{source.path}: the mapping {export.format} has no gyroscope")
+    axis = imu.axle(gyroscope)
+    if source.place in ("left_wheel", "right_wheel") or (not source.place and axis is not None):
+        side = source.place.removesuffix("_wheel") or source.side
+        if not side:
+            raise MjchairError(
+                f"{source.path}: it sits on a wheel, and nothing says which; name it left or "
+                f'right, or say place = "left_wheel" in gather.toml'
+            )
+        axis = axis if axis is not None else imu.axle(gyroscope * 1e3)
+        assert axis is not None
+        gyroscope, said_of_it = imu.without_offset(
+            export.time, gyroscope, imu.still(export.time, gyroscope), name
+        )
+        notes += said_of_it
+        speed = gyroscope @ axis
+        tilt = ", ".join(f"{a:+.2f}" for a in axis)
+        notes.append(f"{name}: on the {side} wheel; its axle is ({tilt}) of the sensor's axes")
+        return Instrument(
+            name, source, export.time, {f"{side}_wheel_speed": speed}, {}, speed, side,
+            trigger=export.trigger, notes=tuple(notes),
+        )  # fmt: skip
+    accelerometer = export.accelerometer
+    if accelerometer is not None:
+        accelerometer, said = imu.in_si(accelerometer, name)
+        notes += [said] if said else []
+    return Instrument(
+        name, source, export.time, gyroscope=gyroscope, accelerometer=accelerometer,
+        trigger=export.trigger, notes=tuple(notes),
+    )  # fmt: skip
+
+
+def _short(path: Path) -> str:
+    generic = path.stem.lower() in ("sensors", "inertial", "calinertialandmag")
+    return f"{path.parent.name}/{path.name}" if generic else path.name
+
+
+def _table(source: Source) -> Instrument:
+    """A table whose columns are a study's, by name or by a mapping."""
+    if source.format is not None and source.file is not None:
+        export = read_export(source.file, source.format)
+        time, columns, trigger = export.time, dict(export.columns), export.trigger
+    else:
+        table = read_table(source.path)
+        if RIDER_COLUMNS & set(table.columns) and not _of_wheel(table):
+            return _rider(source, table)
+        time, columns, trigger = np.asarray(table.time), dict(table.columns), None
+    wheels: tuple[str, ...] = ("left_wheel", "right_wheel")
+    torque = {name: columns.pop(name) for name in wheels if name in columns}
+    side, speed = "", None
+    for one in ("left", "right"):
+        if speed is None and f"{one}_wheel_speed" in columns:
+            side, speed = one, _filled(time, columns[f"{one}_wheel_speed"])
+        if speed is None and f"{one}_wheel_angle" in columns:
+            side, speed = one, _rate(time, _filled(time, columns[f"{one}_wheel_angle"]))
+    return Instrument(source.path.name, source, time, columns, torque, speed, side, trigger=trigger)
+
+
+def _of_wheel(table: Table) -> bool:
+    """Whether a table has anything that an instrument on the chair measures."""
+    return any(name not in RIDER_COLUMNS for name in table.columns)
+
+
+def _filled(time: Array, values: Array) -> Array:
+    there = np.isfinite(values)
+    return np.interp(time, time[there], values[there])
+
+
+def _rate(time: Array, angle: Array) -> Array:
+    step = float(np.median(np.diff(time)))
+    window = min(2 * max(1, round(0.5 * SMOOTH / step)) + 1, 2 * ((time.size - 1) // 2) + 1)
+    if window < 5:
+        return np.asarray(np.gradient(angle, time))
+    return np.asarray(savgol_filter(angle, window, 2, deriv=1, delta=step))
+
+
+def shifted(instrument: Instrument, time: Array, notes: Sequence[str] = ()) -> Instrument:
+    """The instrument on another clock, with notes on it."""
+    return replace(instrument, time=time, notes=(*instrument.notes, *notes))

@@ -1,0 +1,246 @@
+"""Instruments of one trial on one clock, in one table.
+
+In: instruments on their own clocks. Out: a `GatheredTrial` whose table has every sample that was
+measured at its own time, so that slower instruments leave empty cells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.errors import MjchairError
+from mjchair.measurement import clocks, imu
+from mjchair.measurement.clocks import Alignment, Signal
+from mjchair.measurement.gather.instruments import Instrument, shifted
+
+Array = NDArray[np.float64]
+
+SAME = 1e-5  # s, within which two samples are of one time
+LEAST = 1.0  # s, of a trial
+RESTS = 0.05  # rad/s of a wheel, below which the chair stands
+TURNS = 0.03  # rad/s rms, of a turning by which sides are checked
+
+
+@dataclass(frozen=True)
+class GatheredTrial:
+    """One trial of a study.
+
+    Attributes:
+      name: of its table. time: (n,), s, the reference's clock. columns: study column -> (n,).
+      manoeuvre: a word. alignments: file -> how its clock was put on the reference.
+      instruments: on the reference's clock, for the picture. notes: one line each. begin: the
+        reference's time at time zero of the table, s.
+    """
+
+    name: str
+    time: Array
+    columns: Mapping[str, Array]
+    manoeuvre: str
+    alignments: Mapping[str, Alignment] = field(default_factory=dict)
+    instruments: tuple[Instrument, ...] = ()
+    notes: tuple[str, ...] = ()
+    begin: float = 0.0
+
+    @property
+    def driven(self) -> bool:
+        """Whether a wheel's torque is among the columns."""
+        return bool({"left_wheel", "right_wheel"} & set(self.columns))
+
+
+def join(name: str, instruments: Sequence[Instrument]) -> GatheredTrial:
+    """The trial of instruments that measured it.
+
+    Raises:
+      MjchairError: clocks that cannot be aligned, or nothing that a study can use.
+    """
+    chosen = _reference(instruments)
+    reference = _with_speed(chosen)
+    ours, alignments, notes = [reference], {}, list(reference.notes)
+    for other in sorted(instruments, key=lambda one: one.speed is None):
+        if other is chosen:
+            continue
+        found = _align(ours, other)
+        alignments[other.name] = found
+        said = f"{name}: clock of {other.name} on that of {reference.name}: {found.text()}"
+        ours.append(shifted(other, found.to_reference(other.time), (said,)))
+        notes += [*other.notes, said]
+    ours, told = _frames(ours)
+    notes += [*told, *_check_sides(name, ours)]
+    begin, end = _span(ours)
+    time, columns = _table(ours, begin, end)
+    if not columns:
+        raise MjchairError(f"trial {name!r}: its files hold no channel of a chair")
+    if time[-1] - time[0] < LEAST:
+        raise MjchairError(f"trial {name!r} lasts {time[-1] - time[0]:.2g} s; at least {LEAST:g} s")
+    driven = bool({"left_wheel", "right_wheel"} & set(columns))
+    word = "push" if driven else "coast"
+    return GatheredTrial(name, time, columns, word, alignments, tuple(ours), tuple(notes), begin)
+
+
+def _reference(instruments: Sequence[Instrument]) -> Instrument:
+    """The instrument whose clock counts: with torque first, then with a wheel's motion."""
+
+    def rank(one: Instrument) -> tuple[bool, bool, bool, float]:
+        moving = one.speed is not None
+        return bool(one.torque), moving and one.ground is None, moving, float(one.time[-1])
+
+    return max(instruments, key=rank)
+
+
+def _with_speed(one: Instrument) -> Instrument:
+    """Markers, where nothing on a wheel tells it, also as a channel of the chair's speed."""
+    if one.ground is None:
+        return one
+    return replace(one, channels={**one.channels, "velocity.x": one.ground})
+
+
+def _align(ours: Sequence[Instrument], other: Instrument) -> Alignment:
+    """How another clock goes with that of the instruments that are aligned."""
+    reference = ours[0]
+    if other.source.offset is not None:
+        return Alignment(float(other.source.offset), 0.0, how="given")
+    if reference.trigger is not None and other.trigger is not None:
+        first, second = (float(np.median(np.diff(one.time))) for one in (reference, other))
+        spread = float(np.hypot(first, second) / np.sqrt(12.0))
+        return Alignment(reference.trigger - other.trigger, spread, how="trigger")
+    names = (reference.name, other.name)
+    if reference.speed is None:
+        raise MjchairError(
+            f"the clocks of {names[0]} and {names[1]} cannot be aligned: neither shows how a wheel "
+            f"turns; give the offset of {names[1]} with --offset FILE=SECONDS"
+        )
+    if other.speed is not None:
+        return clocks.align(*_of_wheels(ours, other), names)
+    if other.accelerometer is None:
+        raise MjchairError(
+            f"the clocks of {names[0]} and {names[1]} cannot be aligned: {names[1]} shows no "
+            "motion along the way; give its offset with --offset FILE=SECONDS"
+        )
+    level = (other.accelerometer @ imu.upright(other.accelerometer).T)[:, :2]
+    return clocks.align(_gained(ours), Signal(other.time, level), names)
+
+
+def _of_wheels(ours: Sequence[Instrument], other: Instrument) -> tuple[Signal, Signal]:
+    """What two wheels' instruments have in common: one wheel's speed, or the pushes of both hands.
+
+    Wheels on two sides turn differently in a bend, and both hands push at once.
+    """
+    twin = next((one for one in ours if one.side == other.side and one.speed is not None), None)
+    one = twin or ours[0]
+    assert one.speed is not None and other.speed is not None
+    if twin is None and one.torque and other.torque:
+        first, second = (next(iter(w.torque.values())) for w in (one, other))
+        return Signal(one.time, first), Signal(other.time, second)
+    return Signal(one.time, one.speed), Signal(other.time, other.speed)
+
+
+def _gained(ours: Sequence[Instrument]) -> Signal:
+    """How the chair speeds up by its wheels, rad/s^2; the mean of the sides that are there."""
+    time = ours[0].time
+    moving = [one for one in ours if one.speed is not None]
+    moving = [one for one in moving if one.ground is None] or moving
+    sides = {one.side: one for one in reversed(moving)}
+    speeds = [np.interp(time, w.time, w.speed) for w in sides.values() if w.speed is not None]
+    return Signal(time, np.gradient(np.mean(speeds, axis=0), time))
+
+
+def _frames(ours: list[Instrument]) -> tuple[list[Instrument], list[str]]:
+    """Sensors on the frame, turned to the chair's axes; a second one is left out."""
+    out: list[Instrument] = []
+    notes: list[str] = []
+    for one in ours:
+        if one.gyroscope is None:
+            out.append(one)
+        elif one.accelerometer is None:
+            notes.append(f"{one.name}: without an accelerometer its axes are not known; left out")
+        elif any(other.gyroscope is not None for other in out):
+            notes.append(f"{one.name}: a second sensor on the frame; it is left out")
+        else:
+            turned, said = _frame(one, ours)
+            out.append(turned)
+            notes += said
+    return out, notes
+
+
+def _frame(one: Instrument, ours: Sequence[Instrument]) -> tuple[Instrument, list[str]]:
+    """A sensor on the frame in the chair's axes, without its gyroscope's offset."""
+    assert one.gyroscope is not None and one.accelerometer is not None
+    moving = [w for w in ours if w.speed is not None]
+    rest = np.full(one.time.size, bool(moving))
+    for wheel in moving:
+        assert wheel.speed is not None
+        rest &= np.abs(np.interp(one.time, wheel.time, wheel.speed)) < RESTS
+    gyroscope, notes = imu.without_offset(one.time, one.gyroscope, rest, one.name)
+    sits = imu.mounting(one.time, one.accelerometer, _gained(ours) if moving else None)
+    how = "as the wheels speed up" if sits.told else "the level axis that varies most, assumed"
+    rows = [
+        f"{a} ({', '.join(f'{v:+.2f}' for v in r)})" for a, r in zip("xyz", sits.axes, strict=True)
+    ]
+    notes.append(
+        f"{one.name}: on the frame; forward is {how}; the chair's axes in its own: "
+        + "; ".join(rows)
+    )
+    channels = dict(one.channels)
+    for i, axis in enumerate("xyz"):
+        channels[f"imu_gyro.{axis}"] = gyroscope @ sits.axes[i]
+        channels[f"imu_accelerometer.{axis}"] = one.accelerometer @ sits.axes[i]
+    return replace(one, channels=channels), notes
+
+
+def _check_sides(name: str, ours: Sequence[Instrument]) -> list[str]:
+    """Whether the gyroscope sees the turns that the two wheels make."""
+    wheels = {w.side: w for w in ours if w.speed is not None and w.side}
+    frame = next((one for one in ours if "imu_gyro.z" in one.channels), None)
+    if len(wheels) < 2 or frame is None:
+        return []
+    speeds = {
+        side: np.interp(frame.time, w.time, w.speed)
+        for side, w in wheels.items()
+        if w.speed is not None
+    }
+    left, right = speeds["left"], speeds["right"]
+    yaw, turn = frame.channels["imu_gyro.z"], right - left
+    if np.std(yaw) < TURNS:
+        return []
+    match = float(np.corrcoef(yaw, turn)[0, 1])
+    if match < -0.5:
+        raise MjchairError(
+            f"trial {name!r}: the gyroscope turns left where {wheels['left'].name} (left wheel) "
+            f"and {wheels['right'].name} (right wheel) turn right (correlation {match:.2f}); "
+            "the sides of the wheels are swapped: name them, or say it in gather.toml"
+        )
+    if match < 0.5:
+        return [f"{name}: the gyroscope does not tell the sides of the wheels ({match:.2f})"]
+    return [f"{name}: the gyroscope confirms the sides of the wheels (correlation {match:.2f})"]
+
+
+def _span(ours: Sequence[Instrument]) -> tuple[float, float]:
+    """Begin and end of the recording of the reference, and of every torque, s."""
+    whole = [ours[0], *(one for one in ours if one.torque)]
+    return max(float(one.time[0]) for one in whole), min(float(one.time[-1]) for one in whole)
+
+
+def _table(ours: Sequence[Instrument], begin: float, end: float) -> tuple[Array, dict[str, Array]]:
+    """All samples within a span of the reference's clock, each in the row of its own time."""
+    kept = [(one, (one.time >= begin - SAME) & (one.time <= end + SAME)) for one in ours]
+    ticks = [np.round(one.time[inside] / SAME).astype(np.int64) for one, inside in kept]
+    rows, places = np.unique(np.concatenate(ticks), return_inverse=True)
+    if rows.size < 2:
+        return np.zeros(1), {}
+    columns: dict[str, Array] = {}
+    first = 0
+    for (one, inside), mine in zip(kept, ticks, strict=True):
+        place = places[first : first + mine.size]
+        first += mine.size
+        for name, values in {**one.torque, **one.channels}.items():
+            if name in columns:
+                continue
+            columns[name] = np.full(rows.size, np.nan)
+            columns[name][place] = values[inside]
+    order = sorted(columns, key=lambda n: (n not in ("left_wheel", "right_wheel"), n))
+    there = [n for n in order if np.isfinite(columns[n]).any()]
+    return np.asarray(rows * SAME - begin, np.float64), {n: columns[n] for n in there}

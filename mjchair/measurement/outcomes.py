@@ -1,0 +1,332 @@
+"""Outcomes of wheelchair propulsion, stroke by stroke, of measured and simulated runs alike.
+
+In: angle, speed and moment of a driven wheel over time, and the hand's total force where it was
+measured. Out: a table with a row a stroke: push and recovery time, cadence, peak and mean moment,
+power, work, contact angle, and how the speed changes within the stroke.
+
+Strokes are cut as Kinetics Toolkit's `cycles.detect_cycles` cuts them, with the thresholds of its
+push-rim tutorial: a push begins where the hand's force rises to 5 N and ends where it falls to 2 N;
+a phase of less than 0.1 s or a push whose peak is below 25 N is none. Without a force the moment
+stands for it, on a push rim of 0.27 m.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.errors import MjchairError, nearest
+from mjchair.measurement.smartwheel import PushRim
+from mjchair.measurement.trial import Trial
+from mjchair.simulation.recording import Recording
+from mjchair.simulation.table import frozen
+from mjchair.storage import write_whole
+
+Array = NDArray[np.float64]
+
+RISES, FALLS, PEAK = 5.0, 2.0, 25.0  # N: a push begins, ends, and must reach
+SHORTEST = 0.1  # s, of a push and of a recovery
+RIM = 0.27  # m, radius of a push rim on a 24-inch wheel: 0.26-0.28, assumption
+UNITS = {
+    "push": "1",
+    "start": "s",
+    "push_time": "s",
+    "recovery_time": "s",
+    "cadence": "1/min",
+    "peak_moment": "N m",
+    "mean_moment": "N m",
+    "peak_power": "W",
+    "mean_power": "W",
+    "work": "J",
+    "contact_angle": "deg",
+    "mean_speed": "rad/s",
+    "speed_change": "rad/s",
+    "peak_speed_at": "1",
+}
+MEANING = {
+    "push": "number of the push",
+    "start": "time at which the push begins",
+    "push_time": "how long the hand is on the rim",
+    "recovery_time": "from the end of the push to the next push",
+    "cadence": "pushes a minute, from this stroke's duration",
+    "peak_moment": "largest moment of the push",
+    "mean_moment": "mean moment over the push",
+    "peak_power": "largest product of moment and wheel speed in the push",
+    "mean_power": "mean of that product over the push",
+    "work": "that product integrated over the push",
+    "contact_angle": "how far the wheel turns in the push",
+    "mean_speed": "mean wheel speed over the stroke",
+    "speed_change": "largest less smallest wheel speed within the stroke",
+    "peak_speed_at": "when the speed is largest, as a share of the stroke",
+}
+
+
+@dataclass(frozen=True)
+class Rim:
+    """What one driven wheel did: all arrays (n,), forward positive.
+
+    Attributes:
+      time: s. angle: rad. speed: rad/s. moment: of the hand about the axle, N m.
+      force: the hand's total force, N; None: not measured. name: of the wheel.
+    """
+
+    time: Array
+    angle: Array
+    speed: Array
+    moment: Array
+    force: Array | None
+    name: str
+
+    def __post_init__(self) -> None:
+        """Check the lengths."""
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if isinstance(value, np.ndarray) and value.shape != self.time.shape:
+                raise MjchairError(
+                    f"{self.name}: {item.name} has shape {value.shape}; time has {self.time.shape}"
+                )
+
+
+class Stroke(NamedTuple):
+    """Samples at which a stroke begins, its push ends, and the next stroke begins (-1: none)."""
+
+    begin: int
+    release: int
+    end: int
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """A row a stroke.
+
+    Attributes:
+      columns: name -> (strokes,), in the units of UNITS; NaN where the recording ends within the
+        stroke. wheel: its name.
+    """
+
+    columns: dict[str, Array]
+    wheel: str
+
+    def __len__(self) -> int:
+        """Number of strokes."""
+        return int(self.columns["push"].size)
+
+    def __getitem__(self, name: str) -> Array:
+        """The column `name`, (strokes,).
+
+        Raises:
+          MjchairError: there is none.
+        """
+        if name not in self.columns:
+            raise MjchairError(f"no outcome {name!r}" + nearest(name, self.columns))
+        return self.columns[name]
+
+    def mean(self, name: str) -> float:
+        """The mean of an outcome over the strokes that have it."""
+        return float(np.nanmean(self[name]))
+
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write the table, whole; units in the header, an empty cell for NaN.
+
+        Raises:
+          MjchairError: a folder that cannot be written.
+        """
+        write_whole(path, self.csv())
+
+    def csv(self) -> str:
+        """The table as CSV."""
+        header = ",".join(f"{name} [{UNITS[name]}]" for name in self.columns)
+        rows = zip(*self.columns.values(), strict=True)
+        lines = [",".join("" if x != x else f"{x:.9g}" for x in row) for row in rows]
+        return "\n".join([header, *lines]) + "\n"
+
+    def text(self) -> str:
+        """The table for people: a row an outcome, with mean, spread and range over strokes."""
+        out = [f"{self.wheel}: {len(self)} strokes"]
+        out.append(f"{'outcome':<15}{'unit':<7}{'mean':>9}{'sd':>9}{'least':>9}{'most':>9}")
+        for name, values in self.columns.items():
+            there = values[np.isfinite(values)]
+            if name in ("push", "start") or not there.size:
+                continue
+            spread = float(there.std(ddof=1)) if there.size > 1 else 0.0
+            numbers = (there.mean(), spread, there.min(), there.max())
+            out.append(f"{name:<15}{UNITS[name]:<7}" + "".join(f"{v:9.3f}" for v in numbers))
+        return "\n".join(out)
+
+
+def outcomes(rim: Rim) -> Outcomes:
+    """The outcomes of every stroke of a wheel.
+
+    Raises:
+      MjchairError: there is no stroke.
+    """
+    found = strokes(rim)
+    if not found:
+        what = f"{PEAK:g} N" if rim.force is not None else f"{PEAK * RIM:.1f} N m"
+        raise MjchairError(
+            f"{rim.name}: no push of {SHORTEST:g} s that reaches {what}; there are no outcomes"
+        )
+    rows = [_row(rim, number, stroke) for number, stroke in enumerate(found, start=1)]
+    columns = {name: frozen([row[name] for row in rows]) for name in UNITS}
+    return Outcomes(columns, rim.name)
+
+
+def strokes(rim: Rim) -> list[Stroke]:
+    """Where strokes begin and end; see the module's docstring."""
+    scale = 1.0 if rim.force is not None else RIM
+    hand = rim.force if rim.force is not None else np.abs(rim.moment)
+    events = _crossings(np.asarray(hand), RISES * scale, FALLS * scale)
+    found = []
+    for i in range(0, len(events) - 1, 2):
+        begin, release = events[i], events[i + 1]
+        end = events[i + 2] if i + 2 < len(events) else -1
+        push = rim.time[release] - rim.time[begin]
+        recovery = rim.time[end] - rim.time[release] if end >= 0 else np.inf
+        high = float(np.max(hand[begin : release + 1])) >= PEAK * scale
+        if push >= SHORTEST and recovery >= SHORTEST and high:
+            found.append(Stroke(begin, release, end))
+    return found
+
+
+def _crossings(hand: Array, rises: float, falls: float) -> list[int]:
+    """Samples at which pushes begin and end in turn; one under way at the first sample is left."""
+    events: list[int] = []
+    off = True
+    for i, value in enumerate(hand):
+        if off and value >= rises:
+            events.append(i)
+            off = False
+        elif not off and value <= falls:
+            events.append(i)
+            off = True
+    return events[2:] if events and events[0] == 0 else events
+
+
+def _row(rim: Rim, number: int, stroke: Stroke) -> dict[str, float]:
+    begin, release, end = stroke
+    push = slice(begin, release + 1)
+    whole = slice(begin, end + 1) if end >= 0 else None
+    moment, power = rim.moment[push], rim.moment[push] * rim.speed[push]
+    row = {
+        "push": float(number),
+        "start": rim.time[begin],
+        "push_time": rim.time[release] - rim.time[begin],
+        "peak_moment": moment.max(),
+        "mean_moment": moment.mean(),
+        "peak_power": power.max(),
+        "mean_power": power.mean(),
+        "work": np.trapezoid(power, rim.time[push]),
+        "contact_angle": np.degrees(rim.angle[release] - rim.angle[begin]),
+    }
+    names = ("recovery_time", "cadence", "mean_speed", "speed_change", "peak_speed_at")
+    if whole is None:
+        return row | dict.fromkeys(names, np.nan)
+    speed, lasts = rim.speed[whole], rim.time[end] - rim.time[begin]
+    fastest = (rim.time[begin + int(np.argmax(speed))] - rim.time[begin]) / lasts
+    values = (rim.time[end] - rim.time[release], 60.0 / lasts, speed.mean(), np.ptp(speed), fastest)
+    return row | dict(zip(names, values, strict=True))
+
+
+def of_push_rim(run: PushRim, name: str = "wheel") -> Rim:
+    """The rim of a recording whose signs and baseline are put right."""
+    force = np.linalg.norm(run.forces[:, :3], axis=1)
+    return Rim(run.time, run.angle, run.speed, run.torque, force, name)
+
+
+def of_recording(recording: Recording, wheel: str = "left_wheel") -> Rim:
+    """The rim of a simulated run.
+
+    Raises:
+      MjchairError: the wheel was not driven, or the recording does not tell how it turned.
+    """
+    if wheel not in recording.controls:
+        raise MjchairError(f"{wheel} was not driven" + nearest(wheel, recording.controls))
+    angle, speed = recording[f"{wheel}_angle"], recording[f"{wheel}_speed"]
+    return Rim(recording.time, angle, speed, recording.controls[wheel], None, wheel)
+
+
+def of_trial(trial: Trial, wheel: str = "left_wheel") -> Rim:
+    """The rim of a measured run that has a wheel's torque, and its angle or speed.
+
+    Raises:
+      MjchairError: it has not.
+    """
+    if trial.inputs is None or wheel not in trial.inputs.controls:
+        known = trial.inputs.controls if trial.inputs is not None else ()
+        raise MjchairError(f"{trial.name}: no torque of {wheel}" + nearest(wheel, known))
+    time = trial.time[np.isfinite(trial.inputs.controls[wheel])]
+    moment = trial.inputs.at(wheel, time)
+    if f"{wheel}_angle" in trial.channels:
+        angle = np.interp(time, *trial.samples(f"{wheel}_angle"))
+        return Rim(time, angle, _speed(time, angle), moment, None, wheel)
+    if f"{wheel}_speed" in trial.channels:
+        speed = np.interp(time, *trial.samples(f"{wheel}_speed"))
+        steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(time)
+        return Rim(time, np.r_[0.0, np.cumsum(steps)], speed, moment, None, wheel)
+    raise MjchairError(f"{trial.name}: neither {wheel}_angle nor {wheel}_speed is there")
+
+
+def _speed(time: Array, angle: Array) -> Array:
+    """Speed of an angle, by the local parabola over 1/12 s that push-rim recordings have."""
+    from scipy.signal import savgol_filter
+
+    rate = 1.0 / float(np.median(np.diff(time)))
+    window = 2 * max(1, round(rate / 24.0)) + 1
+    even = np.arange(time[0], time[-1], 1.0 / rate)
+    window = min(window, 2 * ((even.size - 1) // 2) + 1)
+    if window < 3:
+        return np.asarray(np.gradient(angle, time))
+    smooth = savgol_filter(np.interp(even, time, angle), window, 2, deriv=1, delta=1.0 / rate)
+    return np.asarray(np.interp(time, even, smooth))
+
+
+def read_rim(
+    path: str | os.PathLike[str],
+    baseline: str | os.PathLike[str] | None = None,
+    wheel: str = "left_wheel",
+) -> Rim:
+    """The rim in a file: a recording (.npz), a SmartWheel file, or a table of a study.
+
+    Args:
+      path: the file. baseline: of a SmartWheel file; None: see `baseline.without_baseline`.
+      wheel: "left_wheel" or "right_wheel", of a recording or a table with both.
+
+    Raises:
+      MjchairError: it is none of these, or as its reader does.
+    """
+    from mjchair.measurement.baseline import without_baseline
+    from mjchair.measurement.smartwheel import oriented, read_smartwheel
+    from mjchair.simulation.recording import load_recording
+
+    path = Path(path)
+    if path.suffix == ".npz":
+        return of_recording(load_recording(path), wheel)
+    if _has_time(path):
+        return of_trial(_trial(path), wheel)
+    still = read_smartwheel(baseline) if baseline is not None else None
+    run = oriented(without_baseline(read_smartwheel(path), still))
+    return of_push_rim(run, path.stem)
+
+
+def _has_time(path: Path) -> bool:
+    """Whether a file is a table of a study: Parquet, or CSV whose header begins with time."""
+    if path.suffix.lower() == ".parquet":
+        return True
+    try:
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
+            return file.readline().strip().lower().startswith("time")
+    except OSError as error:
+        raise MjchairError(f"cannot read {path}: {error.strerror}") from None
+
+
+def _trial(path: Path) -> Trial:
+    from mjchair.measurement.trial import trial_from_table
+    from mjchair.model.spec import load_spec
+    from mjchair.simulation.table import read_table
+
+    return trial_from_table(read_table(path), load_spec("manual").compile(), path.stem)

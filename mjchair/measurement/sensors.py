@@ -1,0 +1,74 @@
+"""What is known of a chair's sensors: unit, wrap, noise floor, and what no chair passes.
+
+In: the name of a scalar channel, such as `imu_gyro.z`. Out: the entry of its sensor. Everything
+that has to know a sensor asks here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensor:
+    """One kind of sensor; all numbers in `unit` unless said otherwise.
+
+    Attributes:
+      unit: SI; "?" where it is not known.
+      floor: the least noise that is believed: no instrument, and no simulation at 2 ms, is better.
+      fault: bias of a sensor that was not calibrated, as a rule (assumption).
+      bias: standard deviation of the bias that every such sensor has; None: it has none.
+      gain: standard deviation of its scale about 1 (assumption); None: it counts or is calibrated.
+      most: the largest value that a wheelchair shows. fastest: its largest rate, in unit/s.
+        For a wheel both are of what the chair rolls: m and m/s.
+      wraps: whether it is an angle that jumps by a turn. free_zero: whether its zero is anywhere.
+      degrees: the same unit with degrees in place of radians, which people forget; "" for none.
+    """
+
+    unit: str
+    floor: float
+    fault: float
+    bias: float | None = None
+    gain: float | None = None
+    most: float | None = None
+    fastest: float | None = None
+    wraps: bool = False
+    free_zero: bool = False
+    degrees: str = ""
+
+
+# A wheelchair rolls up to 10 m/s, and spins at most twice as fast as in sports, 12 rad/s.
+# by the end of the sensor's name, the first that fits
+SENSORS = {
+    "wheel_angle": Sensor(
+        unit="rad", floor=1e-3, fault=0.05, fastest=10.5, free_zero=True, degrees="deg"
+    ),
+    "caster_angle": Sensor(unit="rad", floor=1e-3, fault=0.05, most=13.0, degrees="deg"),
+    "angle": Sensor(unit="rad", floor=1e-3, fault=0.05, degrees="deg"),
+    "wheel_speed": Sensor(
+        unit="rad/s", floor=3e-3, fault=0.1, gain=0.01, most=10.5, degrees="deg/s"
+    ),
+    "speed": Sensor(unit="rad/s", floor=3e-3, fault=0.1, degrees="deg/s"),
+    "gyro": Sensor(
+        unit="rad/s", floor=1e-3, fault=0.02, bias=0.003, gain=0.01, most=12.0, degrees="deg/s"
+    ),  # bias: of a zeroed gyroscope
+    "accelerometer": Sensor(
+        unit="m/s^2", floor=1e-2, fault=0.2, bias=0.05, gain=0.01, most=80.0
+    ),  # bias: with the mounting
+    "position": Sensor(unit="m", floor=5e-4, fault=0.05),
+    "velocity": Sensor(unit="m/s", floor=5e-4, fault=0.05, most=15.0),
+    "heading": Sensor(unit="rad", floor=3e-4, fault=0.05, fastest=12.0, wraps=True, degrees="deg"),
+    "tire": Sensor(unit="N", floor=0.3, fault=5.0),
+}
+UNKNOWN = Sensor(unit="?", floor=1e-3, fault=0.1)
+
+
+def sensor(channel: str) -> Sensor:
+    """The entry of a scalar channel, whatever prefix and component its name has."""
+    name = channel.rsplit(".", 1)[0]
+    return next((s for end, s in SENSORS.items() if name.endswith(end)), UNKNOWN)
+
+
+def rolls(channel: str) -> bool:
+    """Whether the channel is of a rear wheel's rolling, so that its limits are the chair's."""
+    return channel.rsplit(".", 1)[0].endswith(("wheel_angle", "wheel_speed"))

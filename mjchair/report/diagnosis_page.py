@@ -1,0 +1,319 @@
+"""The report of a diagnosis: one page that opens offline.
+
+In: a diagnosis and its figures. Out: HTML with style and figures inside. The first screen says what
+is missing, how sure that is and what to do next, with one picture; the argument is folded below it.
+The form is in templates/, the sentences are made in diagnosis_words.py.
+"""
+
+from __future__ import annotations
+
+import base64
+import functools
+import io
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import jinja2
+import matplotlib
+from markupsafe import Markup, escape
+from matplotlib.figure import Figure
+
+from mjchair.diagnosis.next_experiment.wording import plain
+from mjchair.diagnosis.replay.pulses import Force
+from mjchair.diagnosis.result import Candidate, Diagnosis
+from mjchair.effects.library import find
+from mjchair.errors import MjchairError
+from mjchair.report import colours, diagnosis_words
+from mjchair.report.diagnosis_figures import (
+    candidates,
+    gap,
+    missing_force,
+    probability,
+    summary,
+    where,
+    whole_runs,
+)
+
+TEMPLATE = "diagnosis.html"
+CANDIDATES = 14  # rows of the table
+EXPERIMENTS = 8
+CELLS = 8
+RESOLUTION = 120  # dots per inch
+
+
+@dataclass(frozen=True)
+class Head:
+    """The head of a column, and whether it holds numbers."""
+
+    text: str
+    number: bool = False
+
+
+@dataclass(frozen=True)
+class Row:
+    """Cells of a row, and whether it is the chosen one."""
+
+    cells: Sequence[str]
+    chosen: bool = False
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of text; without rows it is not shown."""
+
+    heads: Sequence[Head] = ()
+    rows: Sequence[Row] = field(default_factory=list)
+
+
+def figures(diagnosis: Diagnosis) -> dict[str, bytes]:
+    """The figures as PNG, by name; those that have nothing to show are left out."""
+    makers = {
+        "summary": summary.figure,
+        "where": where.figure,
+        "force": missing_force.figure,
+        "candidates": candidates.figure,
+        "compared": whole_runs.figure,
+        "gap": gap.figure,
+        "probability": probability.figure,
+    }
+    with matplotlib.rc_context({"font.size": 9.5}):
+        drawn = {name: make(diagnosis) for name, make in makers.items()}
+    return {name: _png(figure) for name, figure in drawn.items() if figure is not None}
+
+
+def _png(figure: Figure) -> bytes:
+    out = io.BytesIO()
+    figure.savefig(out, format="png", dpi=RESOLUTION, metadata={"Software": None})
+    return out.getvalue()
+
+
+def page(
+    diagnosis: Diagnosis,
+    drawn: Mapping[str, bytes],
+    title: str = "Diagnosis",
+    replay: str = "",
+) -> str:
+    """The page as HTML.
+
+    Args:
+      drawn: figures by name, as `figures` makes them.
+      title: of the page, such as the study's.
+      replay: HTML of a replay to show on the first screen; "": none.
+    """
+    words = diagnosis_words
+    evidence, gaps = diagnosis.evidence, diagnosis.gap
+    said = {
+        "missing": words.missing(diagnosis),
+        "sure": words.sure(diagnosis),
+        "next": words.next_step(diagnosis),
+        "gap": words.gap_words(diagnosis),
+        "process": words.process_words(diagnosis),
+        "drivers": words.driver_words(diagnosis),
+        "alike": words.alike_words(diagnosis),
+        "choice": words.choice_words(diagnosis),
+        "left": words.left_words(diagnosis),
+        "runs": words.runs_words(diagnosis),
+        "experiment": diagnosis.next_experiment or words.next_step(diagnosis),
+        "experiments": _experiments_note(diagnosis),
+    }
+    tables = {
+        "where": _cells(diagnosis),
+        "drivers": _drivers(diagnosis),
+        "candidates": _candidates(diagnosis),
+        "effects": _effects(diagnosis),
+        "gap": _gap(diagnosis),
+        "experiments": _experiments(diagnosis),
+        "moved": _moved(diagnosis),
+    }
+    return (
+        _environment()
+        .get_template(TEMPLATE)
+        .render(
+            title=title,
+            said=said,
+            tables=tables,
+            notes=words.notes(diagnosis),
+            captions={
+                "summary": summary.caption(diagnosis),
+                "where": where.caption(diagnosis),
+                "force": missing_force.CAPTION,
+                "compared": whole_runs.CAPTION,
+            },
+            pictures={name: base64.b64encode(image).decode() for name, image in drawn.items()},
+            replay=replay,
+            corrected=bool(diagnosis.effects),
+            highest=evidence.windows.highest if evidence else 0.0,
+            scope=gaps.scope if gaps else "",
+            colours={"after": colours.AFTER},
+        )
+    )
+
+
+@functools.cache
+def _environment() -> jinja2.Environment:
+    """Everything that is put into the page is escaped, whatever its file is called."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("mjchair.report"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters["strong"] = lambda text: _marked(text, r"\*\*(.+?)\*\*", "b")
+    environment.filters["code"] = lambda text: _marked(text, r"`([^`]+)`", "code")
+    return environment
+
+
+def _marked(text: str, pattern: str, tag: str) -> Markup:
+    """Escaped text in which what the pattern's group holds stands in a tag."""
+    return Markup(re.sub(pattern, rf"<{tag}>\1</{tag}>", str(escape(text))))
+
+
+def _cells(diagnosis: Diagnosis) -> Table:
+    heads = [
+        Head("trial"),
+        Head("channel"),
+        Head("window"),
+        Head("regime"),
+        Head("chi² / dof (1)", True),
+    ]
+    rows = [
+        Row(
+            [
+                w.trial,
+                w.channel,
+                f"{w.window[0]:.1f} to {w.window[1]:.1f} s",
+                diagnosis_words.regime(diagnosis, w),
+                f"{w.statistic:.3g}" if w.statistic < 1000 else f"{w.statistic:,.0f}",
+            ]
+        )
+        for w in diagnosis.where[:CELLS]
+    ]
+    return Table(heads, rows)
+
+
+def _drivers(diagnosis: Diagnosis) -> Table:
+    names = {Force.FORWARD: "forward force", Force.YAW: "yaw moment"}
+    rows = [
+        Row(
+            [
+                names.get(d.force, d.force),
+                diagnosis_words.plain_name(str(d.goes_with)),
+                f"{d.sigmas:.1f}",
+            ]
+        )
+        for d in diagnosis_words.known_drivers(diagnosis)
+    ]
+    return Table([Head("force"), Head("goes with"), Head("sigma", True)], rows)
+
+
+def _candidates(diagnosis: Diagnosis) -> Table:
+    chosen = {(e.name, e.channel) for e in diagnosis.effects}
+    heads = [
+        Head("effect"),
+        Head("what it looks like"),
+        Head("size (sigma)", True),
+        Head("gain left out (chi²)", True),
+        Head("closes", True),
+        Head("|cos|", True),
+    ]
+    rows = [
+        Row(_candidate(c), (c.name, c.channel) in chosen)
+        for c in candidates.leading(diagnosis, CANDIDATES)
+    ]
+    return Table(heads, rows)
+
+
+def _candidate(c: Candidate) -> list[str]:
+    on = f" ({c.channel})" if c.channel else ""
+    return [
+        diagnosis_words.plain_name(c.name) + on,
+        _signature(c),
+        f"{c.detectability:.1f}",
+        f"{c.held_out_gain:,.0f}",
+        f"{c.closure:.0%}",
+        f"{c.collinear:.2f}",
+    ]
+
+
+def _signature(c: Candidate) -> str:
+    """The effect's one line; nothing for an effect of the user's own."""
+    try:
+        return find(c.name, c.channel).signature
+    except MjchairError:
+        return ""
+
+
+def _effects(diagnosis: Diagnosis) -> Table:
+    heads = [
+        Head("effect"),
+        Head("parameter"),
+        Head("value", True),
+        Head("standard deviation", True),
+        Head("unit"),
+        Head("closes", True),
+    ]
+    rows = [
+        Row(
+            [
+                diagnosis_words.plain_name(e.name) + (f" ({e.channel})" if e.channel else ""),
+                diagnosis_words.plain_name(name),
+                f"{p.value:.4g}",
+                "held" if p.std is None else f"{p.std:.2g}",
+                p.unit,
+                f"{e.closure:.0%}",
+            ]
+        )
+        for e in diagnosis.effects
+        for name, p in e.parameters.items()
+    ]
+    return Table(heads, rows)
+
+
+def _gap(diagnosis: Diagnosis) -> Table:
+    """Before, after where there is a corrected chair, and noise."""
+    g = diagnosis.gap
+    if g is None:
+        return Table()
+    rows = [Row(["the chair as it was", f"{g.before:.2f}"])]
+    if diagnosis.effects and g.after is not None:
+        rows.append(Row(["the corrected chair", f"{g.after:.2f}"]))
+    rows.append(Row(["noise alone", f"{g.noise_floor:.2f}"]))
+    return Table([Head("what is left of"), Head("rms over noise (1)", True)], rows)
+
+
+def _experiments(diagnosis: Diagnosis) -> Table:
+    plan = diagnosis.evidence.plan if diagnosis.evidence else None
+    if plan is None:
+        return Table()
+    heads = [Head("manoeuvre"), *(Head(f"from {plain(r)} (sigma)", True) for r in plan.rivals)]
+    rows = [
+        Row([e.manoeuvre.name, *(f"{t**0.5:.1f}" for t in e.separations)], chosen=k == 0)
+        for k, e in enumerate(plan.experiments[:EXPERIMENTS])
+    ]
+    return Table(heads, rows)
+
+
+def _experiments_note(diagnosis: Diagnosis) -> str:
+    plan = diagnosis.evidence.plan if diagnosis.evidence else None
+    if plan is None:
+        return ""
+    shown = min(EXPERIMENTS, len(plan.experiments))
+    return (
+        f"{shown} of {len(plan.experiments)} manoeuvres, best first, and simplest first above 10 "
+        "sigmas, simulated with the corrected chair: how far each explanation would fall behind "
+        "after everything that is only roughly known, and its own parameters, have been fitted."
+    )
+
+
+def _moved(diagnosis: Diagnosis) -> Table:
+    heads = [
+        Head("quantity"),
+        Head("prior standard deviation", True),
+        Head("unit"),
+        Head("moved by (prior standard deviations)", True),
+    ]
+    rows = [
+        Row([diagnosis_words.plain_name(m.name), f"{m.std:.3g}", m.unit, f"{m.by:+.2f}"])
+        for m in (diagnosis.evidence.moved if diagnosis.evidence else ())
+    ]
+    return Table(heads, rows)

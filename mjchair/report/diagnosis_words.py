@@ -1,0 +1,290 @@
+"""What the report of a diagnosis says, in plain sentences.
+
+In: a diagnosis. Out: text. **Two stars** stand about what is to be bold and `backticks` about what
+is typed, for the page to show; nothing here is HTML.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+from mjchair.diagnosis.explain.column_ids import Quantity
+from mjchair.diagnosis.next_experiment.wording import plain
+from mjchair.diagnosis.replay.pulses import Force
+from mjchair.diagnosis.result import Diagnosis, Disagreement, MissingForce, NamedEffect
+from mjchair.diagnosis.rules import LEVEL, PARTLY, Verdict
+
+LEAST = 1e-6  # a chance below this is said to be below it
+# what a force may go with that is not known where nothing tells how the chair turns
+TURNING = (Quantity.YAW_RATE, Quantity.HEADING, Quantity.SWIVEL, Quantity.RIGHT_TURN)
+UNSURE = 0.005  # probabilities below this are not named
+
+
+def missing(diagnosis: Diagnosis) -> str:
+    """What is missing, in one sentence."""
+    effects = " and ".join(effect_words(e) for e in diagnosis.effects)
+    if diagnosis.verdict == Verdict.NONE:
+        return nothing_missing(diagnosis)
+    if diagnosis.verdict == Verdict.NAMED:
+        return remainder_words(diagnosis) + f"The chair lacks {effects}."
+    if diagnosis.verdict == Verdict.AMBIGUOUS:
+        sets = "; and ".join(" or ".join(bold(n) for n in s) for s in diagnosis.alternatives)
+        doubt = (
+            f"{sets}, which these runs cannot tell apart"
+            if sets
+            else "an effect for which the evidence is thin"
+        )
+        lacks = f"The chair lacks {doubt}; the corrected chair has {effects}."
+        return remainder_words(diagnosis) + lacks
+    return "A force is missing that no effect of the library explains, so none is named."
+
+
+def nothing_missing(diagnosis: Diagnosis) -> str:
+    """That nothing is missing, or nothing that matters, with the number."""
+    gap, material = diagnosis.gap, diagnosis.material
+    if gap is None or gap.p_value >= LEVEL or material is None:
+        return "Nothing: the chair explains these runs as well as the noise in them allows."
+    return (
+        "Nothing that matters: more than noise is left, but no missing force is larger than "
+        f"{material.value:.2g} N, and below {material.limit:.2g} N none matters."
+    )
+
+
+def remainder_words(diagnosis: Diagnosis) -> str:
+    """What a name leaves, before the name; nothing where nothing is left."""
+    if not diagnosis.more_missing:
+        return ""
+    closed = max((e.closure for e in diagnosis.effects), default=0.0)
+    goes = ", which goes with " + str(diagnosis.drivers[0].goes_with) if diagnosis.drivers else ""
+    return (
+        f"More is missing than what is named here: that explains {closed:.0%} of the gap, and a "
+        f"remainder is left{goes}. "
+    )
+
+
+def process_words(diagnosis: Diagnosis) -> str:
+    """What shakes the chair: the line between the gap and the noise of the sensors."""
+    process = diagnosis.process
+    if not process:
+        return ""
+    names = {"drive": "forward", "side": "sideways", "yaw": "about the vertical"}
+    levels = ", ".join(
+        f"{size(e.value)} {e.unit} {names[name]}" for name, e in process.items() if name in names
+    )
+    return (
+        "Between the gap and the noise of the sensors stands what shakes the chair and repeats in "
+        f"no run (joints of the floor, spokes, breathing): {levels}, as these runs show it. A gap "
+        "is what stands out of both."
+    )
+
+
+def sure(diagnosis: Diagnosis) -> str:
+    """How sure that is, in one sentence."""
+    probability: Mapping[str, float] | None = getattr(diagnosis, "probability", None)
+    if probability:
+        return _probabilities(probability)
+    gap = diagnosis.gap
+    if gap is None:
+        return "Nothing was tested."
+    where = "On held-out runs" if "held-out" in gap.scope else "On the runs of the fit"
+    before = f"what the chair leaves is {size(gap.before)} times the noise"
+    if diagnosis.verdict == Verdict.NONE:
+        return (
+            f"{where} {before}, and noise alone leaves as much in {share(gap.p_value)} of studies."
+        )
+    if diagnosis.verdict == Verdict.UNKNOWN:
+        return (
+            f"That something is missing is certain: {before}, and chance alone would show such a "
+            f"gap with {chance(gap.p_value)}."
+        )
+    after = f", and {size(gap.after)} times the noise when corrected" if gap.after else ""
+    return f"{where} {before} as it was{after}."
+
+
+def _probabilities(probability: Mapping[str, float]) -> str:
+    ordered = sorted(probability.items(), key=lambda item: -item[1])
+    said = [f"{100 * p:.0f} % {hypothesis_words(name)}" for name, p in ordered[:3] if p >= UNSURE]
+    return "Probability: " + ", ".join(said) + "."
+
+
+def hypothesis_words(name: str) -> str:
+    """A hypothesis of `probability` in words."""
+    known = {"none": "nothing missing", "outside": "something outside the library"}
+    return known.get(name, " and ".join(plain_name(n) for n in name.split("+")))
+
+
+def next_step(diagnosis: Diagnosis) -> str:
+    """What to do next, in one sentence."""
+    if not diagnosis.next_experiment:
+        if diagnosis.verdict == Verdict.NONE:
+            return "Nothing is needed; use the chair as it is."
+        return "These data decide; use the corrected chair (model.xml)."
+    return first_sentence(diagnosis.next_experiment)
+
+
+def known_drivers(diagnosis: Diagnosis) -> list[MissingForce]:
+    """What the force goes with; without what turns where nothing tells how the chair turns."""
+    if diagnosis.evidence is None or diagnosis.evidence.turns:
+        return diagnosis.drivers
+    return [
+        d
+        for d in diagnosis.drivers
+        if d.force == Force.FORWARD and d.goes_with.quantity not in TURNING
+    ]
+
+
+def regime(diagnosis: Diagnosis, cell: Disagreement) -> str:
+    """How the chair moved where it disagrees, as far as that is known."""
+    turns = diagnosis.evidence is None or diagnosis.evidence.turns
+    known = {k: v for k, v in cell.regime.items() if turns or k != "yaw_rate"}
+    return "; ".join(f"{plain_name(k)} {v}" for k, v in known.items())
+
+
+def first_sentence(text: str) -> str:
+    """The text up to its first full stop that ends a sentence."""
+    head, stop, _ = text.partition(". ")
+    return head + "." if stop else text
+
+
+def gap_words(diagnosis: Diagnosis) -> str:
+    """Whether there is a gap, with the test's result."""
+    p = diagnosis.gap.p_value if diagnosis.gap else 1.0
+    exists = (
+        "It is not worth a search: the verdict is none."
+        if diagnosis.verdict == Verdict.NONE
+        else "It is more than noise."
+    )
+    return (
+        f"All tests together: noise alone makes such a gap with {chance(p)}, at a level of "
+        f"{LEVEL:g}. {exists}"
+    )
+
+
+def driver_words(diagnosis: Diagnosis) -> str:
+    """What introduces the table of what the force goes with."""
+    if known_drivers(diagnosis):
+        return "What is left goes with:" if diagnosis.effects else "It goes with:"
+    if diagnosis.effects:
+        return "After the correction no force is left that goes with anything tested."
+    return "No force that goes with anything tested stands out."
+
+
+def alike_words(diagnosis: Diagnosis) -> str:
+    """Which effects these data cannot tell apart."""
+    if diagnosis.alternatives:
+        sets = "; ".join(" / ".join(bold(n) for n in s) for s in diagnosis.alternatives)
+        return f"Not to be told apart by these data: {sets}."
+    if diagnosis.verdict == Verdict.NAMED:
+        return "No two explanations are left that these data cannot tell apart."
+    return ""
+
+
+def choice_words(diagnosis: Diagnosis) -> str:
+    """Why this effect, or why none."""
+    if diagnosis.verdict == Verdict.NONE:
+        return "None is named, since there is no gap to explain."
+    if diagnosis.verdict == Verdict.NAMED:
+        return (
+            "It is significant, it holds on runs that it was not fitted to, it closes most of the "
+            "gap, and no rival comes near."
+        )
+    if diagnosis.verdict == Verdict.AMBIGUOUS:
+        return (
+            "It is one explanation that fits. Another of its set fits about as well, or its "
+            "parameter is not clearly away from nothing."
+        )
+    rules = (
+        f"None is named. An answer closes at least {PARTLY:.0%} of the gap and holds on runs that "
+        "it was not fitted to; no effect, nor two or three together, does both. "
+    )
+    return rules + nearest_words(diagnosis) + "Section 2 is what is known of the force."
+
+
+def nearest_words(diagnosis: Diagnosis) -> str:
+    """The explanation that comes nearest where none is named."""
+    near = diagnosis.nearest
+    if near is None:
+        return ""
+    names = " with ".join(plain(key) for key in near.effects)
+    return (
+        f"The nearest, {names}, closes {near.closure:.0%} of the gap and leaves "
+        f"{size(near.remainder)} times the noise. "
+    )
+
+
+def left_words(diagnosis: Diagnosis) -> str:
+    """What the tests say of what a correction leaves; nothing without one."""
+    gap = diagnosis.gap
+    if gap is None or gap.p_value_after is None or not diagnosis.effects:
+        return ""
+    by_chance = chance(gap.p_value_after)
+    said = f"All tests again on what is left: noise alone makes as much with {by_chance}"
+    small = gap.p_value_after < LEVEL
+    return said + (", below the level: something is left." if small else ", so it is noise.")
+
+
+def runs_words(diagnosis: Diagnosis) -> str:
+    """Which runs are shown whole."""
+    held = diagnosis.evidence and any(run.held_out for run in diagnosis.evidence.runs)
+    if held:
+        return "Runs that were held out of every fit."
+    return "No run is held out in this study (`hold_out = true`), so these are runs of the fit."
+
+
+def notes(diagnosis: Diagnosis) -> list[str]:
+    """What was assumed or noticed, each once."""
+    said = list(dict.fromkeys(n for n in diagnosis.notes if not n.startswith("nothing in the lib")))
+    if diagnosis.effects:
+        said.append(
+            "The corrected chair (model.xml) has the effects of section 4 in it, and what is only "
+            "roughly known where the fit moved it, as the table below says."
+        )
+    return said
+
+
+def effect_words(effect: NamedEffect) -> str:
+    """Name and parameters of an effect."""
+    on = f" on {effect.channel}" if effect.channel else ""
+    return f"{bold(effect.name)}{on} ({', '.join(_parameters(effect))})"
+
+
+def _parameters(effect: NamedEffect) -> Iterable[str]:
+    for name, p in effect.parameters.items():
+        unit = "" if p.unit == "1" else f" {p.unit}"
+        yield f"{plain_name(name)} {with_error(p.value, p.std)}{unit}"
+
+
+def with_error(value: float, std: float | None) -> str:
+    """A value with its standard deviation, to the digits that this allows."""
+    if std is None:
+        return f"{value:.4g} held"
+    if not (0.0 < std < 1e4 and std > 1e-6):
+        return f"{value:.4g} ± {std:.2g}"
+    digits = max(0, 1 - math.floor(math.log10(std)))
+    return f"{value:.{digits}f} ± {std:.{digits}f}"
+
+
+def plain_name(name: str) -> str:
+    """A name of an effect or a parameter as words."""
+    return name.replace("_", " ")
+
+
+def bold(name: str) -> str:
+    """A name as words, to be shown bold."""
+    return f"**{plain_name(name)}**"
+
+
+def chance(p: float) -> str:
+    """A probability; below LEAST its size says nothing more."""
+    return f"p = {p:.2g}" if p >= LEAST else "p < 0.000001"
+
+
+def share(p: float) -> str:
+    """A probability as a share of cases."""
+    return f"{100 * p:.0f} %" if p >= 0.01 else f"{100 * p:.1g} %"
+
+
+def size(ratio: float) -> str:
+    """A ratio with two digits."""
+    return f"{ratio:.0f}" if ratio >= 10 else f"{ratio:.2g}"

@@ -1,0 +1,140 @@
+"""The picture of a gathered study: the readings of all instruments for one motion, on one clock.
+
+In: the trials. Out: a figure with a row for each trial: wheel speeds above, and torque or turning
+rate below.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from mjchair.measurement.gather.instruments import Instrument
+from mjchair.measurement.gather.join import GatheredTrial
+from mjchair.report.colours import FAINT, NOTE, SERIES, SIDES
+
+Array = NDArray[np.float64]
+
+MOST = 6  # trials that are drawn
+ROW = 2.6  # inches a trial
+STYLES = ("-", "--", ":", "-.")
+
+
+def gathered_figure(trials: Sequence[GatheredTrial]) -> Figure:
+    """Wheel speeds of all instruments, the torque after its baseline, and turning rates."""
+    shown = _different(trials)[:MOST]
+    figure, axes = plt.subplots(
+        len(shown), 2, figsize=(12.0, ROW * len(shown) + 0.9), layout="constrained", squeeze=False
+    )
+    for trial, (left, right) in zip(shown, axes, strict=True):
+        _speeds(left, trial)
+        _second(right, trial)
+        for one in (left, right):
+            one.grid(alpha=0.3)
+            one.set_xlabel("time (s)")
+    more = len(_different(trials)) - len(shown)
+    text = "What the instruments say of one motion, on one clock"
+    figure.suptitle(text + (f" (first {MOST} trials; {more} more)" if more else ""))
+    return figure
+
+
+def _different(trials: Sequence[GatheredTrial]) -> list[GatheredTrial]:
+    """One trial for each recording, where several trials were cut from one recording."""
+    seen: list[GatheredTrial] = []
+    for trial in trials:
+        if not any(trial.instruments == other.instruments for other in seen):
+            seen.append(trial)
+    return seen
+
+
+def _colour(one: Instrument, number: int) -> str:
+    return SIDES.get(f"{one.side}_wheel", SERIES[number % len(SERIES)])
+
+
+def _speeds(axes: Axes, trial: GatheredTrial) -> None:
+    count: dict[str, int] = {}
+    for number, one in enumerate(trial.instruments):
+        if one.speed is None:
+            continue
+        used = count[one.side] = count.get(one.side, -1) + 1
+        time = one.time - trial.begin
+        side = f"{one.side} wheel, " if one.side else ""
+        axes.plot(
+            time, one.speed, STYLES[used % len(STYLES)], lw=1.2,
+            color=_colour(one, number), label=f"{side}{one.name}",
+        )  # fmt: skip
+    _forward(axes, trial)
+    lines = [f"{name}: {found.text()}" for name, found in trial.alignments.items()]
+    axes.set_title("\n".join([trial.name, *lines]), fontsize=8, loc="left", color=NOTE)
+    axes.set_ylabel("wheel speed (rad/s)")
+    axes.set_xlim(0.0, float(np.ptp(trial.instruments[0].time)))
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=7, loc="best", framealpha=0.8)
+
+
+def _forward(axes: Axes, trial: GatheredTrial) -> None:
+    """The speed from the accelerometer on the frame, without drift, scaled to the wheel speed."""
+    frame = next((i for i in trial.instruments if "imu_accelerometer.x" in i.channels), None)
+    motion = next((i for i in trial.instruments if i.speed is not None), None)
+    if frame is None or motion is None or motion.speed is None:
+        return
+    pull = frame.channels["imu_accelerometer.x"]
+    steps = 0.5 * (pull[1:] + pull[:-1]) * np.diff(frame.time)
+    gained = np.r_[0.0, np.cumsum(steps)]
+    wheel = np.interp(frame.time, motion.time, motion.speed)
+    line = frame.time - frame.time.mean()
+    terms = np.column_stack([gained, np.ones_like(line), line, line**2])
+    fitted = terms @ np.linalg.lstsq(terms, wheel, rcond=None)[0]
+    axes.plot(
+        frame.time - trial.begin, fitted, lw=0.9, color=SERIES[1],
+        label=f"{frame.name}, acceleration summed",
+    )  # fmt: skip
+
+
+def _second(axes: Axes, trial: GatheredTrial) -> None:
+    """The torque where it was measured, with times without a hand shaded; else the turning rate."""
+    driven = [one for one in trial.instruments if one.torque]
+    if driven or trial.driven:
+        _torque(axes, trial, driven)
+    else:
+        _turning(axes, trial)
+
+
+def _torque(axes: Axes, trial: GatheredTrial, driven: Sequence[Instrument]) -> None:
+    for one in driven:
+        for wheel, torque in one.torque.items():
+            style = "-" if wheel == "left_wheel" else "--"
+            time = one.time - trial.begin
+            axes.plot(
+                time, torque, style, lw=1.0, color=SIDES[wheel], label=wheel.replace("_", " ")
+            )
+    if not driven:
+        wheel = "left_wheel" if "left_wheel" in trial.columns else "right_wheel"
+        axes.plot(trial.time, trial.columns[wheel], lw=1.0, color=SIDES[wheel], label="estimated")
+    free = next((one for one in driven if one.free is not None), None)
+    if free is not None and free.free is not None:
+        axes.fill_between(
+            free.time - trial.begin, 0.0, 1.0, where=free.free, color=FAINT, alpha=0.35, lw=0,
+            transform=axes.get_xaxis_transform(), label="no hand on the rim",
+        )  # fmt: skip
+    axes.axhline(0.0, color=NOTE, lw=0.6)
+    axes.set_ylabel("torque about the axle (N m)")
+    axes.legend(fontsize=7, loc="best", framealpha=0.8)
+
+
+def _turning(axes: Axes, trial: GatheredTrial) -> None:
+    frame = next((i for i in trial.instruments if "imu_gyro.z" in i.channels), None)
+    if frame is not None:
+        time = frame.time - trial.begin
+        axes.plot(time, frame.channels["imu_gyro.z"], lw=1.0, color=SERIES[2], label=frame.name)
+        axes.legend(fontsize=7, loc="best")
+    spans = [n for n in trial.columns if n.endswith(("_speed", "_angle"))]
+    if not frame and spans:
+        there = np.isfinite(trial.columns[spans[0]])
+        axes.plot(trial.time[there], trial.columns[spans[0]][there], lw=1.0, color=SERIES[2])
+    axes.set_ylabel("turning rate (rad/s)" if frame else (spans or [""])[0])

@@ -1,0 +1,1 @@
+"""Simulation: the inputs that drive a chair, and the recording of a run."""

@@ -1,0 +1,184 @@
+"""Whether a chair stands on its wheels: the rule, and its use on a simulated run.
+
+In: the angle between the chair's z and the floor's normal, and the loads on the wheels. Out: how
+and when the chair stopped standing, or None. The rule:
+
+- A chair that leans more than `TIPPED` from the floor's normal has tipped over. The normal is that
+  of the plane geom `floor`, or the vertical where there is no such plane.
+- A chair has tipped over when both rear wheels, or both wheels of one side, bear no load during
+  at least the last `UNLOADED` seconds of a run, without interruption: it lies on its footrest or on
+  its side. Casters in the air do not count as tipping, since a chair may stand on its anti-tippers
+  or in a wheelie.
+- A chair has left the ground when no wheel bears load for `UNLOADED` seconds. A chair that hops
+  over a kerb is in the air for less than 0.1 s; in 0.5 s it falls 1.2 m.
+
+A wheel that bears less than `LEAST` of the weight counts as one without load.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjchair.model.wheels import base_name, wheels
+from mjchair.simulation import names
+
+Array = NDArray[np.float64]
+
+TIPPED = math.radians(45.0)  # rad; its handles or its side touch the floor by then
+UNLOADED = 0.5  # s
+LEAST = 1e-6  # of the weight
+
+
+class Fall(enum.Enum):
+    """How a chair stops standing on its wheels."""
+
+    TIPPED = "tipped over"
+    OFF_GROUND = "left the ground"
+
+
+class Fallen(NamedTuple):
+    """How and when a chair stopped standing. time: s, when it began. reason: in words."""
+
+    kind: Fall
+    time: float
+    reason: str
+
+
+def chair_joints(model: mujoco.MjModel) -> list[int]:
+    """The free joints of bodies that stand on tires: one a chair."""
+    roots = {int(model.body_rootid[wheel.body]) for wheel in wheels(model)}
+    joints = [int(model.body_jntadr[root]) for root in sorted(roots)]
+    free = int(mujoco.mjtJoint.mjJNT_FREE)
+    return [joint for joint in joints if joint >= 0 and model.jnt_type[joint] == free]
+
+
+def floor_normal(model: mujoco.MjModel) -> Array:
+    """Upward normal (3,) of the plane geom `floor` at the start; the vertical where there is none.
+
+    A plane that hangs on a moving body counts as it lies at the model's initial pose.
+    """
+    for i, name in enumerate(names.geoms(model)):
+        if names.same(name, "floor") and model.geom_type[i] == mujoco.mjtGeom.mjGEOM_PLANE:
+            data = mujoco.MjData(model)
+            mujoco.mj_kinematics(model, data)
+            return np.asarray(data.geom_xmat[i].reshape(3, 3)[:, 2]).copy()
+    gravity = np.asarray(model.opt.gravity)
+    size = float(np.linalg.norm(gravity))
+    return -gravity / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
+
+
+def lean(model: mujoco.MjModel, joint: int, qpos: Array, normal: Array) -> Array:
+    """Angle (n,), rad, between a chair's z and the normal, at positions (n, nq)."""
+    at = int(model.jnt_qposadr[joint]) + 3
+    w, x, y, z = (qpos[:, at + i] for i in range(4))
+    up = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), w * w - x * x - y * y + z * z], axis=1)
+    size = np.maximum(w * w + x * x + y * y + z * z, 1e-12)
+    return np.arccos(np.clip(up @ normal / size, -1.0, 1.0))
+
+
+def groups(wheel_names: Iterable[str]) -> dict[str, list[str]]:
+    """Groups of wheels that must not be without load: words for the group -> names of its wheels.
+
+    Only for a chair whose wheels have the names of mjchair.model.wheels.WHEELS.
+    """
+    known = {base_name(name): name for name in wheel_names}
+    rear, sides = ("left_wheel", "right_wheel"), ("left", "right")
+    if not {*rear, *(f"{side}_caster" for side in sides)} <= set(known):
+        return {}
+    more = {s: [n for n in (f"{s}_rear_caster",) if n in known] for s in sides}
+    pairs = {
+        f"{'all' if more[s] else 'both'} wheels of its {s} side": [
+            f"{s}_wheel",
+            f"{s}_caster",
+            *more[s],
+        ]
+        for s in sides
+    }
+    pairs["both rear wheels"] = list(rear)
+    return {words: [known[name] for name in pair] for words, pair in pairs.items()}
+
+
+def first_fall(
+    time: Array, leans: Array, loads: Mapping[str, Array], weight: float
+) -> Fallen | None:
+    """How and when a chair stopped standing on its wheels during a run, if it did.
+
+    Args:
+      time: (n,), s. leans: (n,), rad, from the floor's normal. loads: wheel -> (n,), N.
+      weight: of the chair, N.
+    """
+    falls = []
+    over = np.flatnonzero(leans > TIPPED)
+    if over.size:
+        k = int(over[0])
+        words = f"it leans {math.degrees(leans[k]):.0f} deg from the floor's normal"
+        falls.append(Fallen(Fall.TIPPED, float(time[k]), words))
+    empty = {wheel: ~(load > LEAST * weight) for wheel, load in loads.items()}
+    in_air = "bore no load from then on"
+    if empty:
+        began = _lasting(time, np.logical_and.reduce(list(empty.values())))
+        if began is not None:
+            falls.append(Fallen(Fall.OFF_GROUND, began, f"no wheel bore load for {UNLOADED:g} s"))
+    for words, pair in groups(loads).items():
+        together = np.logical_and.reduce([empty[wheel] for wheel in pair])
+        began = _lasting(time, together, to_the_end=True)
+        if began is not None:
+            falls.append(Fallen(Fall.TIPPED, began, f"{words} {in_air}"))
+    # in the air every pair of wheels is without load: leaving the ground takes precedence
+    return min(falls, key=lambda f: (f.time, f.kind is Fall.TIPPED), default=None)
+
+
+def _lasting(time: Array, true: NDArray[np.bool_], to_the_end: bool = False) -> float | None:
+    """Start of the first interval of at least `UNLOADED` seconds in which `true` holds, s, or None.
+
+    Args:
+      to_the_end: count only an interval that lasts until the end.
+    """
+    edges = np.diff(np.concatenate([[False], true, [False]]).astype(np.int8))
+    for first, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+        long = time[end - 1] - time[first] >= UNLOADED
+        if long and (end == time.size or not to_the_end):
+            return float(time[first])
+    return None
+
+
+def fall_of_run(model: mujoco.MjModel, time: Array, qpos: Array, sensed: Array) -> Fallen | None:
+    """How and when the first of the model's chairs stopped standing in a run.
+
+    Args:
+      time: (n,), s. qpos: (n, nq). sensed: (n, nsensordata).
+    """
+    normal = floor_normal(model)
+    weights = float(np.linalg.norm(model.opt.gravity)) * model.body_subtreemass
+    falls = []
+    for joint in chair_joints(model):
+        body = int(model.jnt_bodyid[joint])
+        loads = {
+            wheel.name: sensed[:, place]
+            for wheel in wheels(model)
+            if model.body_rootid[wheel.body] == body
+            and (place := _load_place(model, wheel.actuator)) is not None
+        }
+        fallen = first_fall(time, lean(model, joint, qpos, normal), loads, weights[body])
+        if fallen is not None:
+            falls.append(fallen)
+    return min(falls, key=lambda f: f.time, default=None)
+
+
+def _load_place(model: mujoco.MjModel, actuator: int) -> int | None:
+    """Index of a wheel's load in the sensor data; None: the wheel has no tire sensor."""
+    for i in range(model.nsensor):
+        if (
+            model.sensor_type[i] == mujoco.mjtSensor.mjSENS_USER
+            and model.sensor_objtype[i] == mujoco.mjtObj.mjOBJ_ACTUATOR
+            and model.sensor_objid[i] == actuator
+        ):
+            return int(model.sensor_adr[i]) + 2
+    return None

@@ -1,0 +1,124 @@
+"""Files are written whole or not at all, beside their place first; and read within a bound.
+
+In: a path and contents, or a folder to write into. Out: the file, whole; or one line on why not.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from mjchair.errors import MjchairError
+
+
+@contextmanager
+def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A temporary path beside `path`, renamed to it when the block ends without an exception.
+
+    The temporary file keeps the suffix of `path`, since writers choose the format by it.
+
+    Raises:
+      MjchairError: the folder of `path` does not exist or cannot be written.
+    """
+    target = Path(path)
+    try:
+        handle, name = tempfile.mkstemp(
+            dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix
+        )
+    except OSError as error:
+        raise MjchairError(
+            f"cannot write {target}: {error.strerror}; give a writable folder"
+        ) from None
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
+    """Write `content` to `path`, whole or not at all; see `whole` for what it raises."""
+    with whole(path) as temporary:
+        if isinstance(content, str):
+            temporary.write_text(content, encoding="utf-8")
+        else:
+            temporary.write_bytes(content)
+
+
+def check_new(path: str | os.PathLike[str], force: bool = False) -> Path:
+    """The file that a command may write; nothing is made yet.
+
+    Args:
+      path: the file.
+      force: allow a file that is there already.
+
+    Raises:
+      MjchairError: the path is a folder, or a file that is there while `force` is false.
+    """
+    file = Path(path)
+    if file.is_dir():
+        raise MjchairError(f"{file} is a folder; give the name of a file, as {file / 'result'}")
+    if file.exists() and not force:
+        raise MjchairError(f"{file} is there already; choose another name, or give --force")
+    return file
+
+
+def check_vacant(path: str | os.PathLike[str], force: bool = False) -> Path:
+    """The folder that a command may write into; nothing is made yet.
+
+    Args:
+      path: the folder.
+      force: allow a folder that already holds files.
+
+    Raises:
+      MjchairError: the path is a file, or the folder holds files and `force` is false.
+    """
+    folder = Path(path)
+    if folder.exists() and not folder.is_dir():
+        raise MjchairError(f"{folder} is a file; --out takes a folder")
+    if folder.is_dir() and any(folder.iterdir()) and not force:
+        raise MjchairError(
+            f"{folder} is not empty; choose another --out, or overwrite with --force"
+        )
+    return folder
+
+
+def output_folder(path: str | os.PathLike[str], force: bool = False) -> Path:
+    """Make the folder that a command writes into, with its parents.
+
+    Raises:
+      MjchairError: as check_vacant does, or it cannot be made.
+    """
+    folder = check_vacant(path, force)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise MjchairError(f"cannot make {folder}: {error.strerror}") from None
+    return folder
+
+
+def bounded(path: Path, largest: int, kind: str, reason: str) -> bytes:
+    """What is in a file, if that is no more than `largest` bytes.
+
+    Args:
+      kind: what is wanted, as "a tire file". reason: the end of the line about a larger one.
+
+    Raises:
+      MjchairError: it cannot be read, or is larger.
+    """
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(largest + 1)
+    except OSError as error:
+        raise MjchairError(f"cannot read {path}: {error.strerror}; give {kind}") from None
+    if len(data) > largest:
+        raise MjchairError(f"{path}: more than {reason}")
+    return data

@@ -1,0 +1,105 @@
+"""Units: what a column of a table or a value on the command line may carry, and its size in SI.
+
+In: text such as ``imu_gyro.z [deg/s]`` or ``3deg``. Out: a name and a factor, or a number in SI.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+from mjchair.errors import MjchairError, nearest
+
+# unit -> (SI unit, factor)
+UNITS: dict[str, tuple[str, float]] = {
+    "s": ("s", 1.0),
+    "ms": ("s", 1e-3),
+    "m": ("m", 1.0),
+    "mm": ("m", 1e-3),
+    "cm": ("m", 1e-2),
+    "in": ("m", 0.0254),
+    "rad": ("rad", 1.0),
+    "deg": ("rad", math.pi / 180.0),
+    "m/s": ("m/s", 1.0),
+    "km/h": ("m/s", 1.0 / 3.6),
+    "rad/s": ("rad/s", 1.0),
+    "deg/s": ("rad/s", math.pi / 180.0),
+    "rpm": ("rad/s", math.pi / 30.0),
+    "m/s^2": ("m/s^2", 1.0),
+    "g": ("m/s^2", 9.80665),
+    "kg": ("kg", 1.0),
+    "lb": ("kg", 0.45359237),
+    "N": ("N", 1.0),
+    "N m": ("N m", 1.0),
+    "Nm": ("N m", 1.0),
+    "N mm": ("N m", 1e-3),
+    "1": ("1", 1.0),
+    "%": ("1", 1e-2),
+}
+
+_WITH_UNIT = re.compile(r"^(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?$")
+_QUANTITY = re.compile(r"^(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>.*)$")
+
+
+def split_header(text: str) -> tuple[str, float]:
+    """The name and the factor to SI of a column such as ``left_wheel_speed [deg/s]``.
+
+    A name without brackets is in SI already.
+
+    Raises:
+      MjchairError: an empty name, or a unit that is not known.
+    """
+    match = _WITH_UNIT.match(text.strip())
+    if match is None:
+        raise MjchairError(f"column {text!r}; a column is a name, or a name [unit]")
+    unit = match["unit"]
+    if unit is None:
+        return match["name"], 1.0
+    if unit.strip() not in UNITS:
+        raise MjchairError(f"column {text!r}: unknown unit {unit!r}" + nearest(unit, UNITS))
+    return match["name"], UNITS[unit.strip()][1]
+
+
+def grade(text: str) -> float:
+    """A grade, rise over run, from 0.08, 8% or 1:12.
+
+    Raises:
+      MjchairError: it is none of these.
+    """
+    rise, colon, run = text.partition(":")
+    try:
+        if colon:
+            return float(rise) / float(run)
+        return quantity(text, "1", "grade")
+    except (ValueError, ZeroDivisionError):
+        raise MjchairError(
+            f"grade is {text!r}; it must be a rise over run, such as 0.08, 8% or 1:12"
+        ) from None
+
+
+def units_of(si: str) -> list[str]:
+    """The units that measure the same thing as an SI unit, that one first."""
+    return [unit for unit, (base, _) in UNITS.items() if base == si]
+
+
+def quantity(text: str, si: str, what: str) -> float:
+    """A number in SI from text such as ``3deg``, ``24 in`` or ``0.3``.
+
+    Args:
+      text: a number, with a unit behind it or, in SI, without. si: the SI unit of the result.
+      what: the name of the value, for error lines.
+
+    Raises:
+      MjchairError: no number, or a unit of another kind.
+    """
+    match = _QUANTITY.match(text.strip())
+    if match is None:
+        units = ", ".join(units_of(si)) or si
+        raise MjchairError(f"{what} is {text!r}; it must be a number, with or without a unit "
+                           f"({units})")  # fmt: skip
+    unit = match["unit"].strip()
+    if not unit:
+        return float(match["number"])
+    if unit not in units_of(si):
+        raise MjchairError(f"{what} is {text!r}: its unit must be one of {', '.join(units_of(si))}")
+    return float(match["number"]) * UNITS[unit][1]

@@ -1,1 +1,0 @@
-"""Where model and measurement disagree, and which effect is missing."""

@@ -1,1 +1,0 @@
-"""Named physical effects, each an edit of an MjSpec."""

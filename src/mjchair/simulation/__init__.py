@@ -1,1 +1,0 @@
-"""Simulation: drive inputs, and the recording that a run leaves."""

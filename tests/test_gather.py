@@ -1,0 +1,379 @@
+"""Files of a laboratory with a known motion into a study."""
+
+import lab_files as lab
+import numpy as np
+import pytest
+
+import mjchair
+from mjchair.cli import main
+from mjchair.errors import MjchairError
+from mjchair.measurement import samples
+from mjchair.measurement.clocks import Signal, align, best_alignment
+from mjchair.measurement.delimited import read_delimited
+from mjchair.measurement.exports import matching, read_export, read_formats
+from mjchair.measurement.gather.coasts import coasts
+from mjchair.measurement.gather.gather import gather
+from mjchair.measurement.gather.known import Known
+
+# the chair's axes in a sensor's: x, y, z as rows; it lies on its side and looks backwards
+TILTED = np.array([[-0.5, 0.866, 0.0], [0.0, 0.0, -1.0], [-0.866, -0.5, 0.0]])
+
+
+@pytest.fixture(scope="module")
+def run():
+    return lab.motion(30.0)
+
+
+@pytest.fixture(scope="module")
+def folder(run, tmp_path_factory):
+    """Two push rims that start apart, one with decimal commas, and an NGIMU on the frame."""
+    place = tmp_path_factory.mktemp("lab")
+    lab.smartwheel(place / "push1_left.csv", run, "left")
+    lab.smartwheel(place / "push1_right.csv", run, "right", start=0.21, semicolon=True)
+    own, _, gyroscope, level = lab.frame_sensor(run, mounted=TILTED)
+    lab.ngimu(place / "push1_imu" / "sensors.csv", own, gyroscope, level)
+    return place
+
+
+@pytest.fixture(scope="module")
+def gathered(folder):
+    return gather(folder, Known(rider_mass=77.0, chair_mass=15.0, floor="overground"))
+
+
+def test_sides_signs_and_wraps_are_told_and_said(gathered):
+    said = "\n".join(gathered.notes)
+    assert "push1_left.csv: left wheel; counts down as it rolls forward, Mz > 0" in said
+    assert "push1_right.csv: right wheel; counts up as it rolls forward, Mz < 0" in said
+    assert "wraps at 4095" in said
+    assert "the gyroscope confirms the sides" in said
+
+
+def test_clocks_are_put_on_one_within_their_uncertainty(gathered):
+    (trial,) = gathered.trials
+    for name, true in (("push1_right.csv", 0.21), ("push1_imu/sensors.csv", 0.7)):
+        found = trial.alignments[name]
+        assert found.how == "shared motion"
+        assert 0.0 < found.offset_std < 0.03
+        assert abs(found.offset - true) < 3.0 * found.offset_std
+
+
+def test_torque_speed_and_turning_are_those_of_the_chair(gathered, run):
+    (trial,) = gathered.trials
+    time, wheels, torque = run
+    assert trial.begin == pytest.approx(0.21, abs=0.02)
+    at = trial.time + trial.begin
+    for side, column in (("left", 0), ("right", 1)):
+        there = np.isfinite(trial.columns[f"{side}_wheel"])
+        true = np.interp(at[there], time, torque[:, column])
+        assert np.sqrt(np.mean((trial.columns[f"{side}_wheel"][there] - true) ** 2)) < 0.35
+        there = np.isfinite(trial.columns[f"{side}_wheel_angle"])
+        turned = np.cumsum(wheels[:, column]) * 1e-3
+        true = np.interp(at[there], time, turned)
+        off = trial.columns[f"{side}_wheel_angle"][there] - true
+        assert np.std(off) < 0.05
+    there = np.isfinite(trial.columns["imu_gyro.z"])
+    yaw = np.interp(at[there], time, (wheels[:, 1] - wheels[:, 0]) * lab.RADIUS / lab.TRACK)
+    assert np.std(trial.columns["imu_gyro.z"][there] - yaw) < 0.015
+    pull = np.interp(at[there], time, np.gradient(wheels.mean(axis=1) * lab.RADIUS, time))
+    assert np.std(trial.columns["imu_accelerometer.x"][there] - pull) < 0.15
+    assert np.mean(trial.columns["imu_accelerometer.z"][there]) == pytest.approx(9.81, abs=0.03)
+
+
+def test_noise_is_that_of_the_sensors(gathered):
+    assert gathered.noise["imu_gyro.z"] == pytest.approx(0.005, rel=0.25)
+    assert gathered.noise["imu_accelerometer.y"] == pytest.approx(0.05, rel=0.25)
+    assert gathered.noise["left_wheel_angle"] == pytest.approx(2 * np.pi / 4096 / 12**0.5, rel=0.5)
+
+
+def test_the_study_has_a_comment_at_every_line_and_can_be_read(gathered, tmp_path):
+    for name, text in gathered.files.items():
+        (tmp_path / name).write_text(text)
+    lines = [line for line in gathered.files["study.toml"].splitlines() if "=" in line]
+    assert len(lines) >= 10
+    assert all("#" in line for line in lines)
+    study = mjchair.read_study(tmp_path)
+    assert study.runs[0].trial.inputs.controls.keys() == {"left_wheel", "right_wheel"}
+    assert study.spec.compile().body_mass.sum() == pytest.approx(92.0, abs=0.01)
+
+
+def test_what_cannot_be_known_is_asked_for_by_name(folder):
+    found = gather(folder)
+    asked = " ".join(found.asked)
+    for flag in ("--rider-mass", "--chair-mass", "--floor"):
+        assert flag in asked
+    assert "--wheel-radius" not in asked  # the instrumented wheel was set to one
+    text = found.files["study.toml"]
+    assert "# occupant_mass = 75" in text
+    assert "wheel_radius = 0.300" in text
+
+
+def test_swapped_sides_are_seen_by_the_gyroscope(folder, tmp_path):
+    (tmp_path / "push1_imu").mkdir()
+    (tmp_path / "push1_imu" / "sensors.csv").write_bytes(
+        (folder / "push1_imu" / "sensors.csv").read_bytes()
+    )
+    for one, other in (("left", "right"), ("right", "left")):
+        content = (folder / f"push1_{one}.csv").read_bytes()
+        (tmp_path / f"push1_{other}.csv").write_bytes(content)
+    with pytest.raises(MjchairError, match="the sides of the wheels are swapped"):
+        gather(tmp_path)
+
+
+def test_files_of_two_motions_are_not_put_together(tmp_path, run):
+    lab.smartwheel(tmp_path / "a_left.csv", run, "left")
+    other = lab.motion(30.0, seed=11)
+    own, _, gyroscope, level = lab.frame_sensor(other)
+    lab.ngimu(tmp_path / "a_imu" / "sensors.csv", own, gyroscope, level)
+    with pytest.raises(MjchairError, match=r"cannot be aligned: correlation 0.* at .* s; give"):
+        gather(tmp_path)
+    told = gather(tmp_path, offsets={"sensors.csv": 0.4}).trials[0]
+    assert told.alignments["a_imu/sensors.csv"].how == "given"
+
+
+def test_even_strokes_leave_the_lag_open():
+    time = np.arange(0.0, 20.0, 0.01)
+    stroke = np.sin(2 * np.pi * time)
+    noise = np.random.default_rng(0).normal(size=(2, time.size)) * 0.3
+    found = best_alignment(Signal(time, stroke + noise[0]), Signal(time, stroke + noise[1]))
+    assert not found.clear
+    with pytest.raises(MjchairError, match="cannot be aligned"):
+        align(Signal(time, stroke + noise[0]), Signal(time, stroke + noise[1]))
+
+
+@pytest.mark.parametrize("drift", [0.0, 400e-6])
+def test_drift_is_found_with_its_uncertainty(drift):
+    rng = np.random.default_rng(4)
+    time = np.arange(0.0, 80.0, 0.01)
+    motion = np.convolve(rng.normal(size=time.size), np.hanning(60), "same")
+    own = np.arange(0.0, 78.0, 0.013)
+    seen = np.interp(own * (1 + drift) + 1.1, time, motion) + 0.5 * rng.normal(size=own.size)
+    found = align(Signal(time, motion), Signal(own, seen))
+    middle = found.offset + found.drift * 39.0
+    assert abs(middle - 1.1 - drift * 39.0) < 0.01
+    assert abs(found.drift - drift) < 4.0 * found.drift_std
+    assert found.drift_std < 100e-6
+    assert (found.drift != 0.0) == (drift != 0.0)
+
+
+XSENS = "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z"
+EXPORTS = {  # format -> lines before, header, counts a second, gyroscope first, units of both
+    "ximu3": ((), "Timestamp (us)," + ",".join(
+        f"{s} {a} ({u})" for s, u in (("Gyroscope", "deg/s"), ("Accelerometer", "g")) for a in "XYZ"
+    ), 1e6, True, 180 / np.pi, 1 / 9.80665),
+    "ximu": ((), "Packet number," + ",".join(
+        f"{s} {a} ({u})" for s, u in (("Gyroscope", "deg/s"), ("Accelerometer", "g")) for a in "XYZ"
+    ), 256.0, True, 180 / np.pi, 1 / 9.80665),
+    "xsens_mt": (("// Start Time: Unknown",), XSENS, 1e4, False, 1.0, 1.0),
+    "xsens_dot": (("DeviceTag:,wheel",), XSENS, 1e6, False, 180 / np.pi, 1.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_mappings_of_known_instruments_come_along(name, tmp_path):
+    before, header, ticks, gyroscope_first, gyro, acc = EXPORTS[name]
+    rng = np.random.default_rng(5)
+    time = np.arange(300) / 256.0
+    turning, pull = rng.normal(size=(300, 3)), rng.normal(size=(300, 3))
+    clock = np.round(
+        (time * ticks + 4294967296 - 5000) % 4294967296 if "xsens" in name else time * ticks
+    )
+    vectors = [gyro * turning, acc * pull]
+    columns = vectors if gyroscope_first else [np.arange(300), *vectors[::-1]]
+    order = [clock, *columns] if gyroscope_first else [columns[0], clock, *columns[1:]]
+    lab.write(tmp_path / "a.csv", header, np.column_stack(order), before)
+    file = read_delimited(tmp_path / "a.csv")
+    form = matching(file, read_formats())
+    assert form.name == name
+    read = read_export(file, form)
+    np.testing.assert_allclose(read.time, time, atol=1e-4)
+    np.testing.assert_allclose(read.gyroscope, turning, atol=1e-5)
+    np.testing.assert_allclose(read.accelerometer, pull, atol=2e-5)
+
+
+def test_any_table_comes_in_by_a_mapping_of_ones_own(tmp_path, run):
+    time, wheels, torque = run
+    at = np.arange(0.0, 30.0, 0.02)
+    left, right = (np.degrees(np.interp(at, time, w)) for w in wheels.T)
+    moment = np.interp(at, time, torque[:, 0])
+    rows = np.column_stack([at * 1000 + 5e5, left, -right, moment])
+    lab.write(tmp_path / "trial.txt", "ms;omega L;omega R;M".replace(";", ","), rows)
+    (tmp_path / "mine.toml").write_text(
+        'kind = "table"\nhas = ["ms", "omega L"]\n'
+        'time = { column = "ms", unit = "ms" }\n[columns]\n'
+        'left_wheel_speed = { column = "omega L", unit = "deg/s" }\n'
+        'right_wheel_speed = { column = "omega R", unit = "deg/s", sign = -1 }\n'
+        'left_wheel = { column = "M", unit = "N m" }\n'
+    )
+    (trial,) = gather(tmp_path, mappings=[tmp_path / "mine.toml"]).trials
+    np.testing.assert_allclose(trial.columns["right_wheel_speed"], np.radians(right), atol=1e-4)
+    np.testing.assert_allclose(trial.columns["left_wheel"], moment, atol=1e-4)
+    assert trial.time[0] == 0.0
+
+
+def wheel_sensor(path, run, rate=200.0):
+    """An x-IMU3 on the left wheel, its axle along -y: a wheel's turning and gravity that turns."""
+    time, wheels, _ = run
+    at = np.arange(0.0, time[-1], 1.0 / rate)
+    speed = np.interp(at, time, wheels[:, 0])
+    angle = np.cumsum(speed) / rate
+    zero = np.zeros_like(at)
+    level = np.column_stack([np.cos(angle), zero, np.sin(angle)])
+    gyroscope = np.column_stack([zero, np.degrees(-speed), zero])
+    header = EXPORTS["ximu3"][1]
+    lab.write(path, header, np.column_stack([at * 1e6, gyroscope, level]))
+    return at, speed
+
+
+def test_without_torque_the_free_rolling_parts_are_used_and_it_says_so(tmp_path, run):
+    wheel_sensor(tmp_path / "push_left_wheel.csv", run)
+    found = gather(tmp_path)
+    assert "no torque was measured, and it is pushed; its 1 free-rolling parts" in found.notes[-1]
+    (trial,) = found.trials
+    assert trial.manoeuvre == "coast"
+    assert not trial.driven
+    assert 6.0 < trial.time[-1] - trial.time[0] < 8.0  # the coast at the end lasts about 7 s
+    assert 21.5 < trial.time[0] < 23.5
+
+
+def test_without_torque_and_coasts_the_torque_is_estimated_and_it_says_so(tmp_path):
+    run = lab.motion(20.0, coast=0.2)
+    wheel_sensor(tmp_path / "push_left_wheel.csv", run)
+    found = gather(tmp_path, Known(mass=92.0, wheel_radius=0.3))
+    assert "the torque is estimated" in found.notes[-1]
+    (trial,) = found.trials
+    true = np.interp(trial.time, run[0], run[2].mean(axis=1))
+    assert np.corrcoef(trial.columns["left_wheel"], true)[0, 1] > 0.95
+
+
+def test_a_coast_is_a_coast_and_strokes_are_none(run):
+    time, wheels, _ = run
+    (only,) = coasts(time[::5], wheels[::5, 0])
+    assert 21.5 < only[0] < 23.5
+    assert only[1] > 29.0
+    assert coasts(*_column(lab.motion(20.0, coast=0.2))) == []
+
+
+def _column(run):
+    return run[0][::5], run[1][::5, 0]
+
+
+def test_the_recording_that_ships_is_gathered_by_one_command(tmp_path, capsys):
+    source = tmp_path / "mine"
+    source.mkdir()
+    for path in (samples.propulsion(), samples.baseline()):
+        (source / path.name).write_bytes(path.read_bytes())
+    out = tmp_path / "study"
+    assert main(["gather", str(source), "--out", str(out), "--mass", "92"]) == 0
+    said = capsys.readouterr()
+    assert "N once a turn taken off by baseline baseline.csv" in said.out
+    assert "--floor" in said.err
+    assert sorted(p.name for p in out.iterdir()) == ["gathered.png", "propulsion.csv", "study.toml"]
+
+
+BAD = {
+    "no folder": (["{empty}/none"], "no folder"),
+    "nothing in it": (["{empty}"], "no file of a known kind"),
+    "cut short": (["{cut}"], "is the file cut short"),
+    "text inside": (["{text}"], "is not a number"),
+    "only a baseline": (["{rest}"], "a recording of an untouched rim, and none of the rim in use"),
+    "heavy rider": (["{good}", "--rider-mass", "95", "--mass", "92"], "the rider weighs 95 kg"),
+    "radius in mm": (["{good}", "--wheel-radius", "300"], "is it in mm?"),
+    "unknown floor": (["{good}", "--floor", "overgroud"], "did you mean 'overground'"),
+    "no such file": (["{good}", "--offset", "imu.csv=3"], "--offset imu.csv: no such file"),
+    "no offset": (["{good}", "--offset", "3"], "is not FILE=SECONDS"),
+    "no mapping": (["{good}", "--mapping", "none.toml"], "cannot read none.toml"),
+    "wrong plan": (["{plan}"], "unknown key 'sides'; did you mean 'side'?"),
+    "both left": (["{twice}"], "are both of the left wheel"),
+}
+
+
+@pytest.fixture(scope="module")
+def bad_folders(tmp_path_factory):
+    place = tmp_path_factory.mktemp("bad")
+    lines = samples.propulsion().read_text().splitlines()[:1200]
+    whole = "\n".join(lines) + "\n"
+    content = {
+        "empty/notes.txt": "no numbers here\n",
+        "cut/run.csv": whole[:-60],
+        "text/run.csv": "\n".join([*lines[:50], lines[50].replace("1", "x", 1), *lines[51:]]),
+        "rest/baseline.csv": whole,
+        "good/run.csv": whole,
+        "plan/run.csv": whole,
+        "plan/gather.toml": '[files."run.csv"]\nsides = "left"\n',
+        "twice/a_left.csv": whole,
+        "twice/left_a.csv": whole.replace("0.30", "0.31"),
+    }
+    for name, text in content.items():
+        (place / name).parent.mkdir(exist_ok=True)
+        (place / name).write_text(text)
+    return {path.name: path for path in place.iterdir()}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_gets_one_line_and_nothing_is_written(case, bad_folders, tmp_path, capsys):
+    arguments, line = BAD[case]
+    out = tmp_path / "study"
+    given = [a.format(**bad_folders) for a in arguments]
+    assert main(["gather", *given, "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert line in said
+    assert said.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_riders_motion_comes_on_to_the_clock_of_the_study(run, tmp_path):
+    """Markers see the chair go, and so their clock is found; both riders can be read."""
+    time, wheels, _ = run
+    lab.smartwheel(tmp_path / "push1_left.csv", run, "left")
+    own = np.arange(2.0, 27.0, 0.01)
+    speed = np.interp(own, time, wheels[:, 0]) * lab.RADIUS
+    sway = 0.04 * np.sin(2.0 * np.pi * 0.9 * own)
+    bend = 0.15 * np.sin(2.0 * np.pi * 0.9 * own)
+    rows = np.column_stack([own - 2.0, bend, sway, speed])
+    header = "time,rider_trunk_flexion,rider_motion,chair_speed"
+    np.savetxt(tmp_path / "push1_rider.csv", rows, "%.6g", ",", header=header, comments="")
+    gathered = gather(tmp_path, Known(mass=92.0))
+    (trial,) = gathered.trials
+    found = trial.alignments["push1_rider.csv"]
+    assert abs(found.offset - 2.0) < max(3.0 * found.offset_std, 0.02)
+    there = np.isfinite(trial.columns["rider_motion"])
+    at = trial.time[there] + trial.begin
+    off = trial.columns["rider_motion"][there] - np.interp(at, own, sway)
+    assert np.std(off) < 0.002
+    assert 'rider = "rigid"' in gathered.files["study.toml"]
+    assert "chair_speed" not in trial.columns
+    for name, text in gathered.files.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    rigid = mjchair.read_study(tmp_path).runs[0].trial
+    assert set(rigid.other) == {"rider_motion"}
+    assert set(rigid.inputs.controls) == {"left_wheel", "right_wheel"}
+    text = gathered.files["study.toml"].replace('rider = "rigid"', 'rider = "moving"')
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    moving = mjchair.read_study(tmp_path).runs[0].trial
+    assert set(moving.other) == set() and "rider_trunk_flexion" in moving.inputs.controls
+
+
+def test_markers_alone_are_a_study_of_the_chairs_speed(tmp_path):
+    """Nothing but a rider's table: pushes without torque, of which the free rolling is used."""
+    time = np.arange(0.0, 12.0, 0.01)
+    pushed = np.where(time < 5.0, 1.0 + 0.2 * time + 0.1 * np.sin(6.0 * time), np.nan)
+    speed = np.where(time < 5.0, pushed, 1.9 - 0.09 * (time - 5.0))
+    rows = np.column_stack([time, 0.03 * np.sin(6.0 * time), speed])
+    header = "time,rider_motion,chair_speed"
+    np.savetxt(tmp_path / "run_rider.csv", rows, "%.6g", ",", header=header, comments="")
+    gathered = gather(tmp_path)
+    assert all(trial.manoeuvre == "coast" for trial in gathered.trials)
+    (trial,) = gathered.trials
+    assert trial.time[0] > 4.6 and "velocity.x" in trial.columns
+    assert any("free-rolling parts" in note for note in gathered.notes)
+
+
+def test_a_marker_file_whose_chair_stands_cannot_be_put_on_a_clock(run, tmp_path):
+    lab.smartwheel(tmp_path / "push1_left.csv", run, "left")
+    own = np.arange(0.0, 20.0, 0.01)
+    rng = np.random.default_rng(1)
+    rows = np.column_stack([own, np.sin(own), 0.01 * rng.normal(size=own.size)])
+    header = "time,rider_motion,chair_speed"
+    np.savetxt(tmp_path / "push1_rider.csv", rows, "%.6g", ",", header=header, comments="")
+    with pytest.raises(MjchairError, match=r"cannot be aligned: correlation .*--offset FILE="):
+        gather(tmp_path, Known(mass=92.0))

@@ -1,0 +1,146 @@
+"""The noise that a study shows: powers of sensors and levels of what shakes the chair, drawn and
+found again on small systems; none of them is moved by what an effect makes."""
+
+import numpy as np
+import pytest
+
+from mjchair.diagnosis.fit import noise_levels
+from mjchair.diagnosis.fit.noise_levels import Levels, WindowColumns
+from mjchair.diagnosis.fit.process import KINDS, Part
+from mjchair.diagnosis.fit.whitening import cosines
+from mjchair.diagnosis.replay.noise import EDGES, Noise
+from mjchair.diagnosis.replay.pulses import Force
+
+ROWS, KNOTS, RUNS, WINDOWS = 40, 6, 6, 6
+SPEED, GYRO = 0, 1  # channels
+TRUE = {
+    Part.DRIVE_FAST: 2.0,
+    Part.DRIVE_SLOW: 0.5,
+    Part.SIDE: 0.0,
+    Part.YAW_FAST: 0.6,
+    Part.YAW_SLOW: 0.1,
+}
+POWER = np.array([[4.0, 4.0, 4.0], [0.5, 1.0, 1.0]])
+
+
+def windows(rng, shaken=1.0, effect=0.0):
+    """Windows of two channels, each with the answers to forces that knots make.
+
+    Args:
+      shaken: by what the forces of the last run are multiplied. effect: size of a column.
+    """
+    frequency = np.tile(np.linspace(0.0, 9.9, ROWS), 2)
+    channel = np.repeat([SPEED, GYRO], ROWS)
+    band = np.minimum(np.searchsorted(EDGES, frequency, side="right"), len(EDGES) - 1)
+    time = np.linspace(0.0, 2.0, KNOTS)
+    apart = np.abs(time[:, None] - time[None, :])
+    correlations = {p: np.exp(-apart / kind.time) for p, kind in KINDS.items()}
+    out = []
+    for run in np.repeat(np.arange(RUNS), WINDOWS):
+        answers = {
+            force: rng.standard_normal((2 * ROWS, KNOTS))
+            for force in (Force.FORWARD, Force.LEFTWARD, Force.YAW)
+        }
+        column, state = rng.standard_normal((2, 2 * ROWS, 1))
+        r = np.sqrt(POWER[channel, band]) * rng.standard_normal(2 * ROWS)
+        r = r + effect * column[:, 0] + 3.0 * state[:, 0] * rng.standard_normal()
+        for part, kind in KINDS.items():
+            size = TRUE[part] * (shaken if run == RUNS - 1 else 1.0)
+            course = rng.multivariate_normal(np.zeros(KNOTS), correlations[part])
+            r = r + answers[kind.force] @ (size * course)
+        out.append(
+            WindowColumns(
+                run=int(run),
+                r=r,
+                J=10.0 * column,
+                Z=5.0 * state,
+                pulses=answers,
+                correlations=correlations,
+                wobbles={},
+                band=band,
+                channel=channel,
+                tells=frequency > noise_levels.LEAST_HZ,
+            )
+        )
+    return out
+
+
+def found(drawn, fixed=frozenset()):
+    first = Levels(
+        parts={part: np.full(RUNS, kind.first) for part, kind in KINDS.items()},
+        wobbles={},
+        bands=np.ones((2, len(EDGES))),
+    )
+    return noise_levels.estimate(drawn, first, np.full(2, 1e-4), fixed, steps=40)
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return found(windows(np.random.default_rng(1)))
+
+
+def test_the_powers_of_the_sensors_are_found(plain):
+    np.testing.assert_allclose(plain.bands, POWER, rtol=0.2)
+
+
+def test_the_levels_of_what_shakes_the_chair_are_found(plain):
+    assert np.median(plain.parts[Part.DRIVE_FAST]) == pytest.approx(2.0, rel=0.15)
+    assert np.median(plain.parts[Part.YAW_FAST]) == pytest.approx(0.6, rel=0.15)
+    assert np.median(plain.parts[Part.SIDE]) < 0.15  # nothing pushes sideways
+
+
+def test_what_an_effect_makes_is_no_noise(plain):
+    more = found(windows(np.random.default_rng(1), effect=20.0))
+    np.testing.assert_allclose(more.bands, plain.bands, rtol=0.02)
+    np.testing.assert_allclose(more.parts[Part.DRIVE_FAST], plain.parts[Part.DRIVE_FAST], rtol=0.02)
+
+
+def test_one_run_that_is_pushed_hard_does_not_raise_the_level_of_all():
+    event = found(windows(np.random.default_rng(2), shaken=20.0)).parts[Part.DRIVE_FAST]
+    assert np.median(event[:-1]) < 3.0
+    assert event[-1] < 2.5 * np.median(event[:-1])  # of the 20 times that an event made of it
+
+
+def test_a_level_that_a_person_gave_stays():
+    kept = found(windows(np.random.default_rng(1)), frozenset({Part.DRIVE_FAST}))
+    np.testing.assert_array_equal(kept.parts[Part.DRIVE_FAST], KINDS[Part.DRIVE_FAST].first)
+
+
+def test_what_shakes_harder_than_it_can_is_left_in_the_gap():
+    drawn = windows(np.random.default_rng(1))
+    first = Levels(
+        parts={part: np.full(RUNS, kind.first) for part, kind in KINDS.items()},
+        wobbles={},
+        bands=np.ones((2, len(EDGES))),
+    )
+    held = noise_levels.estimate(drawn, first, np.full(2, 1e-4), most={Force.FORWARD: 0.7})
+    assert held.parts[Part.DRIVE_FAST].max() == pytest.approx(0.7)
+    assert held.parts[Part.YAW_FAST].max() > 0.4
+
+
+def test_the_cosines_of_a_window_are_orthonormal():
+    waves = cosines(50, 20)
+    np.testing.assert_allclose(waves.T @ waves, np.eye(20), atol=1e-12)
+
+
+def test_the_power_of_an_autoregressive_noise_is_that_of_its_samples():
+    """The mean over all frequencies is the variance of a sample, and a draw shows the shape."""
+    noise, step, n = Noise(0.3, 0.4, 0.05, "given"), 0.01, 400
+    every = noise.power(np.arange(n) / (2.0 * n * step), step)
+    assert every.mean() == pytest.approx(0.25, rel=0.01)
+    rng = np.random.default_rng(3)
+    keep = np.exp(-step / noise.time)
+    drawn = np.zeros((2000, n))
+    drawn[:, 0] = noise.slow * rng.standard_normal(2000)
+    for k in range(1, n):
+        kick = noise.slow * np.sqrt(1.0 - keep**2) * rng.standard_normal(2000)
+        drawn[:, k] = keep * drawn[:, k - 1] + kick
+    drawn += noise.white * rng.standard_normal(drawn.shape)
+    seen = ((drawn @ cosines(n, 40)) ** 2).mean(axis=0)
+    np.testing.assert_allclose(seen[1:], every[1:40], rtol=0.15)
+
+
+def test_measured_bands_stand_in_for_the_model():
+    noise = Noise(0.3, 0.4, 0.05, "given", bands=(9.0, 4.0, 1.0))
+    power = noise.power(np.array([0.0, 2.9, 3.0, 6.0, 50.0]), 0.01)
+    np.testing.assert_array_equal(power, [9.0, 9.0, 4.0, 1.0, 1.0])

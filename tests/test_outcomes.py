@@ -1,0 +1,148 @@
+"""Outcomes against Kinetics Toolkit on the same file, and against pushes that are known."""
+
+import sys
+
+import numpy as np
+import pytest
+
+import mjchair
+from mjchair.cli import main
+from mjchair.errors import MjchairError
+from mjchair.measurement import samples
+from mjchair.measurement.outcomes import UNITS, of_recording, outcomes, read_rim
+
+TOLERANCE = {"rtol": 1e-6, "atol": 1e-6}
+
+
+@pytest.fixture(scope="module")
+def toolkit():
+    """Kinetics Toolkit, which looks for news over the network at import unless it cannot."""
+    sys.modules.setdefault("requests_cache", None)
+    import kineticstoolkit
+    import kineticstoolkit_extensions.pushrimkinetics as push_rim
+
+    return kineticstoolkit, push_rim
+
+
+@pytest.fixture(scope="module")
+def theirs(toolkit):
+    ktk, push_rim = toolkit
+    run = push_rim.read_smartwheel(str(samples.propulsion()))
+    run = push_rim.remove_offsets(run, push_rim.read_smartwheel(str(samples.baseline())))
+    run = push_rim.calculate_power(push_rim.calculate_velocity(run))
+    run.data["Mz"] = run.data["Moments"][:, 2]
+    run.data["Ftot"] = np.linalg.norm(run.data["Forces"][:, :3], axis=1)
+    return ktk.cycles.detect_cycles(
+        run,
+        "Ftot",
+        event_names=("push", "recovery"),
+        thresholds=(5, 2),
+        min_durations=(0.1, 0.1),
+        min_peak_heights=(25, -np.inf),
+    )
+
+
+@pytest.fixture(scope="module")
+def ours():
+    return outcomes(read_rim(samples.propulsion(), samples.baseline()))
+
+
+def test_every_outcome_is_kinetics_toolkits(theirs, ours):
+    count = theirs.count_events("push")
+    assert len(ours) == count == 8
+    for i in range(count):
+        push = theirs.get_ts_between_events("push", "recovery", i, i, inclusive=True)
+        time, power = push.time, push.data["Power"]
+        want = {
+            "start": time[0],
+            "push_time": time[-1] - time[0],
+            "peak_moment": push.data["Mz"].max(),
+            "mean_moment": push.data["Mz"].mean(),
+            "peak_power": power.max(),
+            "mean_power": power.mean(),
+            "work": np.trapezoid(power, time),
+            "contact_angle": np.degrees(np.ptp(push.data["Angle"][[0, -1]])),
+        }
+        ends = [e.time for e in theirs.events if e.name == "_"]
+        if i < len(ends):
+            whole = theirs.get_ts_between_times(time[0], ends[i], inclusive=True)
+            speed = whole.data["Velocity"]
+            want |= {
+                "recovery_time": ends[i] - time[-1],
+                "cadence": 60.0 / (ends[i] - time[0]),
+                "mean_speed": speed.mean(),
+                "speed_change": speed.max() - speed.min(),
+            }
+        for name, value in want.items():
+            np.testing.assert_allclose(ours[name][i], value, **TOLERANCE, err_msg=name)
+
+
+def test_angle_speed_and_moment_are_kinetics_toolkits(theirs):
+    rim = read_rim(samples.propulsion(), samples.baseline())
+    turned = theirs.data["Angle"] - theirs.data["Angle"][0]
+    np.testing.assert_allclose(rim.angle, turned, **TOLERANCE)
+    np.testing.assert_allclose(rim.speed, theirs.data["Velocity"], **TOLERANCE)
+    np.testing.assert_allclose(rim.moment, theirs.data["Mz"], **TOLERANCE)
+
+
+@pytest.fixture(scope="module")
+def simulated():
+    pushes = mjchair.push_strokes({"left_wheel": 12.0, "right_wheel": 12.0}, duration=3.0)
+    return mjchair.simulate(mjchair.load_spec("manual"), pushes, initial={"speed": 0.8})
+
+
+def test_a_simulated_run_has_the_outcomes_of_the_pushes_that_made_it(simulated):
+    table = outcomes(of_recording(simulated))
+    assert len(table) == 3
+    assert table["cadence"][0] == pytest.approx(60 / 1.15, rel=0.01)
+    assert table["peak_moment"] == pytest.approx(12.0, rel=0.01)
+    # sin^2 of 12 N m over 0.46 s is above 1.35 and 0.54 N m for a known part of it
+    begins, ends = (np.arcsin(np.sqrt(f * 0.27 / 12)) / np.pi for f in (5.0, 2.0))
+    assert table["push_time"] == pytest.approx(0.46 * (1 - begins - ends), abs=0.011)
+    # work is force along the path: what the chair gains and loses on the way, half a wheel
+    rim = of_recording(simulated)
+    want = np.trapezoid(rim.moment * rim.speed, rim.time)
+    assert table["work"].sum() == pytest.approx(want, rel=0.02)
+
+
+def test_a_table_of_a_study_has_the_outcomes_of_its_recording(simulated, tmp_path):
+    from_run = outcomes(of_recording(simulated, "right_wheel"))
+    simulated.to_csv(tmp_path / "run.csv")
+    simulated.save(tmp_path / "run.npz")
+    for file in ("run.csv", "run.npz"):
+        table = outcomes(read_rim(tmp_path / file, wheel="right_wheel"))
+        for name in UNITS:
+            apart = 0.02 if name == "peak_speed_at" else 5e-3  # a table's speed is from its angle
+            close = {"rtol": 5e-3, "atol": apart, "equal_nan": True, "err_msg": name}
+            np.testing.assert_allclose(table[name], from_run[name], **close)
+
+
+def test_the_command_prints_and_writes_a_row_a_stroke(tmp_path, capsys):
+    out = tmp_path / "outcomes.csv"
+    given = [str(samples.propulsion()), "--baseline", str(samples.baseline()), "--out", str(out)]
+    assert main(["outcomes", *given]) == 0
+    assert "8 strokes" in capsys.readouterr().out
+    rows = out.read_text().splitlines()
+    assert len(rows) == 9
+    assert rows[0].startswith("push [1],start [s],push_time [s]")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["{baseline}"], "no push of 0.1 s that reaches 25 N"),
+        (["nowhere.csv"], "cannot read nowhere.csv"),
+        (["{folder}/README.md"], "no row of numbers"),
+    ],
+)
+def test_bad_input_gets_one_line(arguments, line, capsys):
+    places = {"baseline": samples.baseline(), "folder": samples.folder() / "smartwheel"}
+    assert main(["outcomes", *(a.format(**places) for a in arguments)]) == 2
+    said = capsys.readouterr().err
+    assert line in said
+    assert said.count("\n") == 1
+
+
+def test_a_recording_without_the_wheel_says_so(simulated):
+    with pytest.raises(MjchairError, match="lef_wheel was not driven; did you mean 'left_wheel'"):
+        of_recording(simulated, "lef_wheel")

@@ -1,0 +1,273 @@
+"""The rules of the verdict, one by one, on plain numbers: what each allows and what it stops."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.rules import HeldOut, Standing, Verdict
+
+# an effect that closes all, is sure, and has no rival
+CLEAR = Standing(
+    closure=0.99,
+    gap_left=False,
+    gain_by_run=500.0,
+    gain_by_manoeuvre=300.0,
+    sigmas=(20.0,),
+    at_bound=False,
+    rivals=0,
+)
+
+
+def said(**changes):
+    return rules.verdict(True, replace(CLEAR, **changes))
+
+
+def test_a_clear_effect_is_named():
+    assert said() == Verdict.NAMED == "named"
+
+
+def test_without_a_gap_nothing_is_said_whatever_fits():
+    assert rules.verdict(False, CLEAR) == Verdict.NONE
+    assert rules.verdict(False, None) == Verdict.NONE
+
+
+def test_a_gap_that_nothing_gains_on_is_unknown():
+    assert rules.verdict(True, None) == Verdict.UNKNOWN
+
+
+@pytest.mark.parametrize(
+    "reason",
+    [
+        {"closure": rules.PARTLY - 0.01},
+        {"gain_by_run": rules.HELD - 0.1},
+        {"held_out": HeldOut(before=1000.0, after=900.0, dof=100.0)},
+    ],
+)
+def test_each_of_these_alone_makes_it_unknown(reason):
+    assert said(**reason) == Verdict.UNKNOWN
+
+
+@pytest.mark.parametrize(
+    "allowed",
+    [
+        {"closure": rules.CLOSES},
+        {"gain_by_run": rules.HELD},
+        {"gap_left": True},
+        {"probability": rules.PROBABLE},
+        {"held_out": HeldOut(before=1000.0, after=120.0, dof=100.0)},
+    ],
+)
+def test_just_inside_each_limit_it_is_still_named(allowed):
+    assert said(**allowed) == Verdict.NAMED
+
+
+@pytest.mark.parametrize(
+    "doubt",
+    [
+        {"sigmas": (20.0, rules.SIGMAS)},
+        {"at_bound": True},
+        {"gain_by_manoeuvre": 0.0},
+        {"rivals": 1},
+        {"closure": rules.CLOSES - 0.01},
+        {"closure": rules.PARTLY},
+        {"probability": rules.PROBABLE - 0.01},
+        {"once": True},
+        {"gap_left": True, "runs": 1},
+    ],
+)
+def test_each_of_these_alone_makes_it_ambiguous(doubt):
+    assert said(**doubt) == Verdict.AMBIGUOUS
+
+
+def test_a_gap_needs_the_family_and_one_large_test():
+    assert rules.gap_exists(0.001, 6.0)
+    assert not rules.gap_exists(0.02, 6.0)
+    assert not rules.gap_exists(0.001, rules.LEAST)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "holds"),
+    [
+        (1000.0, 540.0, True),  # an excess of 900 of which less than half is left
+        (1000.0, 560.0, False),
+        (120.0, 150.0, True),  # no excess beyond scatter, 42 for 100 degrees of freedom
+        (120.0, 163.0, False),  # and one that opens
+        (100.0, 100.0, True),
+    ],
+)
+def test_what_held_out_trials_say(before, after, holds):
+    assert rules.carries_over(HeldOut(before=before, after=after, dof=100.0)) == holds
+
+
+def share(**changes):
+    known = {
+        "gained": 900.0,
+        "left": 0.0,
+        "excess": 1000.0,
+        "excess_std": 20.0,
+        "excess_after": 0.0,
+        "excess_after_std": 20.0,
+    }
+    return rules.closure(**{**known, **changes})
+
+
+def test_closure_is_the_share_of_the_excess_that_is_gone():
+    assert share() == 1.0
+    assert share(excess_after=420.0) == pytest.approx(0.6)  # 420 less its scatter of 20
+    assert share(excess_after=15.0) == 1.0  # below its scatter nothing is left
+
+
+def test_what_a_further_test_shows_counts_as_left():
+    assert share(left=100.0) == pytest.approx(0.9)
+    assert share(left=-50.0) == 1.0
+
+
+def test_a_small_excess_has_no_say_of_its_own():
+    assert share(excess=100.0, excess_after=90.0) == 1.0
+    assert share(excess=121.0, excess_after=90.0) == pytest.approx(1.0 - 70.0 / 121.0)
+
+
+def test_closure_stays_between_nothing_and_all():
+    assert share(excess_after=5000.0) == 0.0
+    assert share(gained=-10.0) == 0.0
+
+
+def test_a_further_effect_pays_for_its_parameters():
+    enough = rules.needed(2)
+    assert enough == 2.0 * rules.PENALTY + rules.WORTH
+    held = {"held": rules.HELD, "parameters": 2}
+    assert rules.worth_adding(gained=enough, **held)
+    assert not rules.worth_adding(gained=enough - 0.1, **held)
+
+
+def test_a_further_effect_holds_on_runs_that_it_was_not_fitted_to():
+    assert not rules.worth_adding(gained=1e4, parameters=1, held=rules.HELD - 0.1)
+    assert rules.worth_adding(gained=1e4, parameters=1, held=rules.HELD)
+
+
+def test_a_hypothesis_near_the_best_is_fitted_too():
+    assert rules.worth_trying(score=901.0, best=1000.0, gain=1000.0)
+    assert not rules.worth_trying(score=899.0, best=1000.0, gain=1000.0)
+    assert rules.worth_trying(score=11.0, best=20.0, gain=20.0)  # within what keeps a rival
+
+
+def test_what_an_answer_leaves_is_said():
+    assert not rules.more_missing(CLEAR, walls=0)
+    assert rules.more_missing(CLEAR, walls=1)
+    assert rules.more_missing(replace(CLEAR, gap_left=True), walls=0)
+    assert rules.more_missing(replace(CLEAR, closure=rules.CLOSES - 0.01), walls=0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "matters"),
+    [
+        ({}, False),
+        ({"force": 1.2}, True),
+        ({"gap": rules.SMALL_GAP}, True),  # it shows, though no force goes with anything
+        ({"said": Verdict.NAMED}, False),
+        (
+            {"said": Verdict.NAMED, "sigmas": rules.CERTAIN + 0.1},
+            True,
+        ),  # certain
+        (
+            {"said": Verdict.NAMED, "sigmas": 99.0, "told": True},
+            False,
+        ),  # unless the limit was given
+        ({"said": Verdict.AMBIGUOUS}, False),
+    ],
+)
+def test_what_is_below_the_limit_does_not_matter(changes, matters):
+    known = {
+        "force": 0.4,
+        "limit": 1.2,
+        "gap": 1.1,
+        "told": False,
+        "said": Verdict.UNKNOWN,
+        "sigmas": rules.CERTAIN,
+    }
+    assert rules.matters(**{**known, **changes}) == matters
+
+
+@pytest.mark.parametrize(
+    ("gains", "runs", "once"),
+    [
+        ([0.0, 90.0, 5.0, 1.0, 1.0], [0, 0, 1, 1, 2], True),
+        ([0.0, 60.0, 40.0, 1.0, 1.0], [0, 0, 0, 1, 1], True),  # two windows of one run
+        ([0.0, 60.0, 1.0, 40.0, 1.0], [0, 0, 0, 1, 1], False),  # another pass shows it as well
+        ([30.0, 30.0, 30.0, 20.0, 20.0], [0, 0, 0, 1, 1], False),
+        ([90.0, 5.0], [0, 0], False),  # of two windows one is half of all
+    ],
+)
+def test_what_few_windows_of_one_run_carry_happened_once(gains, runs, once):
+    assert rules.happened_once(np.array(gains), np.array(runs)) == once
+
+
+def test_a_number_is_believed_that_data_tell_better_than_its_bounds():
+    assert rules.believable(std=0.9, change=0.2, width=10.0)
+    assert not rules.believable(std=1.0, change=0.2, width=10.0)  # five sizes worth finding
+    assert not rules.believable(std=0.3, change=0.2, width=1.0)  # as wide as the bounds allow
+
+
+def test_two_starts_that_end_apart_are_told():
+    assert not rules.starts_disagree(100.0, 100.0 + rules.WORTH)
+    assert rules.starts_disagree(100.0, 101.0 + rules.WORTH)
+
+
+def test_an_effect_is_dropped_where_the_others_lose_little():
+    enough = rules.needed(1)
+    assert rules.can_be_dropped(lost=enough - 0.1, parameters=1)
+    assert not rules.can_be_dropped(lost=enough, parameters=1)
+    assert not rules.can_be_dropped(lost=enough, parameters=0)
+
+
+def test_trying_without_is_saved_only_where_both_signs_are_clear():
+    lost = 3.1 * rules.needed(1)
+    assert rules.surely_needed(sigmas=rules.SURE + 0.1, lost=lost, parameters=1)
+    assert not rules.surely_needed(sigmas=rules.SURE, lost=lost, parameters=1)
+    assert not rules.surely_needed(sigmas=20.0, lost=0.9 * lost, parameters=1)
+
+
+def test_ties_are_told_by_scores():
+    assert rules.alike(100.0 - rules.TIE + 0.1, 100.0)
+    assert not rules.alike(100.0 - rules.TIE, 100.0)
+
+
+def test_a_fit_starts_again_where_it_misses_the_promise():
+    assert not rules.fell_short(total=1014.0, promised=1000.0, gain=50.0)
+    assert rules.fell_short(total=1016.0, promised=1000.0, gain=50.0)
+    assert not rules.fell_short(total=1099.0, promised=1000.0, gain=1000.0)
+    assert rules.fell_short(total=1101.0, promised=1000.0, gain=1000.0)
+
+
+def test_a_rival_is_fitted_where_linear_algebra_leaves_it_near():
+    assert rules.worth_refitting(behind=9.9, gain=1000.0, rival_gain=0.0)
+    # 30 behind of a gain of 100: three times two paired errors of 5.5 are 33
+    assert rules.worth_refitting(behind=30.0, gain=150.0, rival_gain=121.0)
+    assert not rules.worth_refitting(behind=34.0, gain=150.0, rival_gain=121.0)
+    assert not rules.worth_refitting(behind=30.0, gain=150.0, rival_gain=119.0)  # 80 % of the gain
+
+
+@pytest.mark.parametrize(
+    ("behind", "errors", "beyond", "stays"),
+    [
+        (9.9, 9.0, False, True),
+        (100.0, 1.9, False, True),
+        (10.0, 2.0, False, False),
+        (0.0, 0.0, True, False),
+    ],
+)
+def test_what_keeps_a_rival(behind, errors, beyond, stays):
+    kept = rules.stays_a_rival(behind=behind, errors=errors, beyond_bound=beyond)
+    assert kept == stays
+
+
+def test_paired_errors_count_windows_not_samples():
+    rng = np.random.default_rng(0)
+    ours = rng.uniform(50.0, 150.0, 40)
+    theirs = ours + rng.normal(1.0, 2.0, 40)
+    difference = theirs - ours
+    expected = difference.mean() / (difference.std(ddof=1) / np.sqrt(40))
+    assert rules.paired_errors(theirs, ours) == pytest.approx(expected)
+    assert rules.paired_errors(np.array([12.0]), np.array([5.0])) == 7.0

@@ -1,0 +1,72 @@
+"""Strokes of a run: when they begin, their phase, and a body that moves in step with them."""
+
+import numpy as np
+
+import mjchair
+from mjchair.diagnosis.data.study import Run, make_study
+from mjchair.diagnosis.replay import noise, strokes
+from mjchair.diagnosis.replay.simulator import WindowSimulator
+from mjchair.diagnosis.replay.window_states import track
+from mjchair.measurement.trial import Trial
+from mjchair.simulation.initial import Initial
+
+TIME = np.arange(0.0, 20.0, 0.01)
+
+
+def pushed(begins, width=0.45, peak=10.0):
+    torque = np.zeros(TIME.size)
+    for begin in begins:
+        x = (TIME - begin) / width
+        torque += np.where((x > 0.0) & (x < 1.0), peak * np.sin(np.pi * x) ** 2, 0.0)
+    inputs = mjchair.Inputs(TIME, {"left_wheel": torque, "right_wheel": torque})
+    channels = {"left_wheel_speed": np.ones(TIME.size)}
+    return Run(Trial("push", TIME, channels, inputs, {}), "push", False, Initial(), frozenset())
+
+
+def test_strokes_are_found_and_the_phase_grows_by_one_turn_each():
+    begins = np.array([1.0, 2.0, 3.1, 4.0, 5.2])
+    found = strokes.beginnings(pushed(begins))
+    np.testing.assert_allclose(np.diff(found), np.diff(begins), atol=0.011)
+    (bout,) = strokes.bouts(found)
+    np.testing.assert_allclose(bout.phase(found), 2.0 * np.pi * np.arange(5), atol=1e-9)
+    assert (np.diff(bout.phase(np.arange(0.5, 6.0, 0.01))) > 0.0).all()
+
+
+def test_a_body_rests_before_and_after_and_in_a_pause():
+    begins = np.r_[np.arange(2.0, 6.0), np.arange(12.0, 16.0)]
+    course = strokes.courses(pushed(begins))["stroke_sine_1"]
+    assert np.abs(course.place_at(np.array([0.0, 0.9, 8.5, 10.0, 18.5]))).max() < 1e-9
+    assert np.abs(course.place_at(np.arange(2.0, 6.0, 0.01))).max() > 0.99
+    speed = np.diff(course.place_at(np.arange(0.0, 20.0, 0.005))) / 0.005
+    assert np.abs(np.diff(speed)).max() < 0.6  # no steps of speed: those would be blows
+
+
+def test_two_pushes_or_a_coast_have_no_strokes():
+    assert strokes.courses(pushed([2.0, 3.0])) == {}
+    coast = Trial("coast", TIME, {"left_wheel_speed": np.ones(TIME.size)}, None, {})
+    assert strokes.courses(Run(coast, "coast", False, Initial(), frozenset())) == {}
+
+
+def test_a_study_of_a_moving_rider_starts_and_goes_on_as_its_tables_say():
+    """Joints of the tables drive the study's chair: it predicts its own runs, a rigid one not."""
+    time = np.arange(0.0, 4.0, 0.01)
+    bend = 0.15 * np.cos(2.0 * np.pi * 0.9 * time)
+    controls = {"rider_trunk_flexion": bend}
+    moving = mjchair.load_spec(rider="moving")
+    inputs = mjchair.Inputs(time, controls)
+    run = mjchair.simulate(moving, inputs, 4.0, initial={"speed": 1.0}, sample_rate=100.0)
+    seen = {"left_wheel_speed": np.array(run["left_wheel_speed"])}
+    left = {}
+    for name, spec, given in (("moving", moving, inputs), ("rigid", mjchair.load_spec(), None)):
+        trial = Trial("nod", np.array(run.time), seen, given, {})
+        study = make_study(spec, [Run(trial, "nod", False, Initial(), frozenset())])
+        simulator = WindowSimulator(study)
+        found = track(simulator, simulator.base, noise.estimate(study))
+        left[name] = np.concatenate(
+            [
+                (simulator.measured(w) - predicted)[:, 0]
+                for w, predicted in zip(simulator.windows, found.predicted, strict=True)
+            ]
+        )
+    assert np.std(left["moving"]) < 0.02
+    assert np.std(left["moving"]) < 0.1 * np.std(left["rigid"])
