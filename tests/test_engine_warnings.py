@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import mjchair
-from mjchair.diagnosis.replay.engine_warnings import unheard
+from mjchair.model.engine_warnings import unheard
 from mjchair.simulation import batch
 
 

@@ -17,11 +17,11 @@ from mjchair.diagnosis.explain.screening import Say, gap_after, prepare, screen_
 from mjchair.diagnosis.explain.search import choose
 from mjchair.diagnosis.replay import strokes
 from mjchair.diagnosis.replay.cache import Store
-from mjchair.diagnosis.replay.engine_warnings import unheard
 from mjchair.diagnosis.replay.simulator import THREADS
 from mjchair.diagnosis.result import Diagnosis
 from mjchair.effects.effect import Effect
 from mjchair.effects.library import library
+from mjchair.model.engine_warnings import unheard
 
 
 def study_effects(study: Study, more: Sequence[Effect] = ()) -> list[Effect]:

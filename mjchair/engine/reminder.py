@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import threading
 import warnings
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
@@ -33,13 +34,12 @@ LINE = (
 def _reminder() -> Any:
     """The callback, for `mujoco.set_mjcb_act_dyn`."""
     time_at = layout.offset("mjData", "time")
-    said = False
+    once = threading.Lock()
 
     def remind(model: int, data: int, actuator: int) -> float:
-        nonlocal said
-        # at time 0 MuJoCo's compiler may be calling
-        if not said and ctypes.c_double.from_address(data + time_at).value > 0.0 and _tires(model):
-            said = True
+        # at time 0 MuJoCo's compiler may be calling; the threads of a batch may be here together
+        started = ctypes.c_double.from_address(data + time_at).value > 0.0
+        if started and not once.locked() and _tires(model) and once.acquire(blocking=False):
             warnings.warn(LINE, stacklevel=2)
         return 0.0
 

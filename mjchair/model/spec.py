@@ -28,6 +28,7 @@ from mjchair.drive.files import read_drive
 from mjchair.drive.quantities import Drive
 from mjchair.errors import MjchairError, nearest
 from mjchair.model import assets, merged_looks, parts, seating
+from mjchair.model.engine_warnings import unheard
 from mjchair.model.ground import FLOOR, read_heights, set_heights, set_step
 from mjchair.model.parameters import ChairParameters
 from mjchair.model.wheels import (
@@ -365,19 +366,10 @@ def _without_plain_frames(text: str) -> str:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Suppress MuJoCo's warnings inside the block."""
-    before, quiet = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
-    quiet.logto_console = quiet.logto_file = False
-    quiet.set()
-    heard = mujoco.get_mju_user_warning()  # dm_control sets one
-    mujoco.set_mju_user_warning(lambda message: None)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)
-            yield
-    finally:
-        mujoco.set_mju_user_warning(heard)
-        before.set()
+    """Suppress MuJoCo's warnings and Python's inside the block."""
+    with unheard(), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        yield
 
 
 def set_grade(spec: mujoco.MjSpec, scene: str, grade: float | None, tilt: str = "floor") -> None:

@@ -9,8 +9,7 @@ from __future__ import annotations
 import copy
 import importlib.metadata
 import os
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -22,6 +21,7 @@ from tqdm import tqdm
 
 from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
+from mjchair.model.engine_warnings import unheard
 from mjchair.model.spec import compile_spec
 from mjchair.model.wheels import check_timestep
 from mjchair.simulation import names
@@ -104,7 +104,7 @@ def simulate(
         controls = inputs.control_array(model, times)
     stored = StoredModel.of(model, spec)
 
-    with installed(compiled), quiet():
+    with installed(compiled), unheard():
         data = start(model, as_initial(initial), brakes, controls[0])
         states, sensed, reason = _run(model, data, controls, every, progress)
     made = assembled(model, stored, states, sensed, controls[::every], reason, every)
@@ -143,17 +143,6 @@ def steps_a_sample(timestep: float, sample_rate: float | None) -> int:
             f"{1.0 / (every * timestep):g} Hz"
         )
     return every
-
-
-@contextmanager
-def quiet() -> Iterator[None]:
-    """Keep MuJoCo's warnings out of a log file; the recording's status has them."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda message: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 def _run(
