@@ -1,4 +1,4 @@
-"""Magic Formula 6.1 and 5.2 written out equation by equation, unfolded, to test the folded law.
+"""Magic Formula 6.1 and 5.2 written out equation by equation, to test mjchair's law.
 
 Straight from Pacejka (2006), section 4.3.2 and Besselink, Schmeitz & Pacejka (2010); forward
 rolling, no ranges. Slow, and independent of mjchair.

@@ -86,9 +86,11 @@ def native():
 
 def test_a_quarter_of_the_demand_at_half_stick():
     profile = read_drive(FILE).profile
-    assert law.shaped(0.5, profile.deadband, profile.curve) == pytest.approx(0.25, abs=0.002)
-    assert law.shaped(-1.0, profile.deadband, profile.curve) == -1.0
-    assert law.shaped(0.2499, 0.25, 1.26) == 0.0
+    assert law.joystick_demand(0.5, profile.deadband, profile.curve) == pytest.approx(
+        0.25, abs=0.002
+    )
+    assert law.joystick_demand(-1.0, profile.deadband, profile.curve) == -1.0
+    assert law.joystick_demand(0.2499, 0.25, 1.26) == 0.0
 
 
 @pytest.mark.parametrize("power", [-500.0, 0.0, 40.0, 3000.0])
@@ -103,7 +105,7 @@ def test_a_ramp_is_monotone_and_ends_at_its_goal():
         now, wanted = rng.uniform(-2, 2, 2)
         rates = rng.uniform(0.1, 5, 3)
         for _ in range(20000):
-            new = law.ramped(now, wanted, *rates, 0.002)
+            new = law.ramp_step(now, wanted, *rates, 0.002)
             assert abs(new - now) <= max(rates) * 0.002 + 1e-12
             assert abs(new - wanted) <= abs(now - wanted)
             if new == wanted:
@@ -163,7 +165,7 @@ def test_load_slows_a_motor_by_what_is_not_compensated(compensation):
     load = -20.0
     data.ctrl[:2] = load
     mujoco.mj_step(model, data, nstep=4000)
-    free = law.shaped(0.5, 0.01, 1.0) * drive.profile.forward_speed[1] / RADIUS
+    free = law.joystick_demand(0.5, 0.01, 1.0) * drive.profile.forward_speed[1] / RADIUS
     drop = -load * (drive.motor.resistance - compensation) / drive.wheel_constant**2
     assert free - data.joint("left_wheel").qvel[0] == pytest.approx(drop, rel=0.01)
 

@@ -42,7 +42,7 @@ def test_the_law_takes_the_functions_of_the_record(name):
     point = (200.0, 0.02, 0.05, 0.01, 1.0, 1.0)
     assert law.family_forces(p, *point) == family.forces(p, *point)
     assert law.family_stiffness(p, 200.0, 0.01, 1.0) == family.stiffness(p, 200.0, 0.01, 1.0)
-    assert law.own_relaxation(p, 200.0, 3e3, 2e3) == family.relaxation(p, 200.0, 3e3, 2e3)
+    assert law.formula_relaxation(p, 200.0, 3e3, 2e3) == family.relaxation(p, 200.0, 3e3, 2e3)
 
 
 def test_a_new_family_is_a_record():
@@ -56,7 +56,7 @@ def test_a_new_family_is_a_record():
 
     number = len(families.REGISTERED)
     new = Family(number, "brush", ("along", "across"), forces, stiffness)
-    chosen = families.choice([*(f.forces for f in families.REGISTERED), new.forces])
+    chosen = families.choose_by_number([*(f.forces for f in families.REGISTERED), new.forces])
     compiled = numba.njit(lambda p, *given: chosen(p, *given))
     point = (200.0, 0.02, 0.05, 0.0, 1.0, 1.0)
 

@@ -1,4 +1,4 @@
-"""Magic Formula 5.2 and 6.1: against reference forces, and against the equations unfolded."""
+"""Magic Formula 5.2 and 6.1: against reference forces, and against the equations one by one."""
 
 import csv
 from pathlib import Path
@@ -66,7 +66,7 @@ def random_numbers(seed, names):
 
 
 @pytest.mark.parametrize("family", ["mf61", "mf52"])
-def test_folding_changes_no_equation(family):
+def test_constants_computed_once_change_no_equation(family):
     names = NAMES_52 if family == "mf52" else NAMES_61
     rng = np.random.default_rng(7)
     for seed in range(5):

@@ -27,7 +27,7 @@ def clip(value: float, low: float, high: float) -> float:
 
 
 @register_jitable(forceinline=True)
-def shaped(deflection: float, deadband: float, curve: float) -> float:
+def joystick_demand(deflection: float, deadband: float, curve: float) -> float:
     """Demand, -1 to 1, of a joystick's deflection: none in the deadband, a power law beyond it."""
     size = (abs(deflection) - deadband) / (1.0 - deadband)
     if size <= 0.0:
@@ -36,7 +36,9 @@ def shaped(deflection: float, deadband: float, curve: float) -> float:
 
 
 @register_jitable(forceinline=True)
-def ramped(now: float, wanted: float, rise: float, fall: float, reverse: float, h: float) -> float:
+def ramp_step(
+    now: float, wanted: float, rise: float, fall: float, reverse: float, h: float
+) -> float:
     """The reference one step later.
 
     Args:
@@ -68,7 +70,8 @@ def open_circuit(charge: float, v0: float, v1: float, v2: float, v3: float, v4: 
 def battery_current(power: float, voltage: float, resistance: float) -> float:
     """Current (A) that gives a power (W) at the terminals: voltage i - R i^2 = power.
 
-    Beyond the most that the battery can give, voltage^2 / (4 R), it is the current of that most.
+    Above the largest power that the battery can give, voltage^2 / (4 R), it is the current of that
+    largest power.
     """
     root = voltage * voltage - 4.0 * resistance * power
     if root <= 0.0:
@@ -98,7 +101,7 @@ def current_limit(
 
 
 @register_jitable(forceinline=True)
-def drawn(
+def motor_operating_point(
     wanted: float, emf: float, resistance: float, limit: float, supply: float
 ) -> tuple[float, float]:
     """Voltage (V) at a motor and its current (A), within the supply and the current limit."""
@@ -122,13 +125,14 @@ def gear_friction(torque: float, spin: float, efficiency: float, idle: float, fa
 
 @register_jitable(forceinline=True)
 def brake_step(
-    windup: float, spin: float, most: float, stiffness: float, damping: float, h: float
+    windup: float, spin: float, torque_limit: float, stiffness: float, damping: float, h: float
 ) -> tuple[float, float]:
     """A parking brake: its windup (rad) one step later, and the torque (N m) against the spin.
 
     Args:
-      spin: rad/s. most: N m, at which it slips. stiffness: N m/rad. damping: N m s/rad. h: s.
+      spin: rad/s. torque_limit: N m, at which it slips. stiffness: N m/rad.
+      damping: N m s/rad. h: s.
     """
-    bound = most / stiffness
+    bound = torque_limit / stiffness
     windup = clip(windup + h * spin, -bound, bound)
-    return windup, clip(stiffness * windup + damping * spin, -most, most)
+    return windup, clip(stiffness * windup + damping * spin, -torque_limit, torque_limit)

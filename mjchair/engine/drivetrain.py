@@ -62,14 +62,16 @@ def kind(m: ModelView, actuator: int) -> int:
 
 
 @register_jitable(forceinline=True)
-def stick(m: ModelView, d: DataView, actuator: int) -> float:
+def joystick_axis(m: ModelView, d: DataView, actuator: int) -> float:
     """Deflection, -1 to 1, of the joystick axis whose actuator it is; 0 where it is no number."""
     value = d.ctrl[m.actuator_ctrladr[actuator]]
     return law.clip(value, -1.0, 1.0) if value == value else 0.0
 
 
 @register_jitable(forceinline=True)
-def unloaded(user: NDArray[np.float64], drive: int, used: float) -> tuple[float, float, float]:
+def battery_without_load(
+    user: NDArray[np.float64], drive: int, used: float
+) -> tuple[float, float, float]:
     """Charge (1), voltage without load (V) and internal resistance (ohm) of the battery."""
     charge = user[drive, CHARGE] - used / user[drive, CAPACITY]
     voltage = law.open_circuit(
@@ -113,12 +115,12 @@ def limit_of(user: NDArray[np.float64], motor: int, boost: float, rise: float) -
 
 @register_jitable(forceinline=True)
 def step_motor(
-    m: ModelView, d: DataView, motor: int, wanted: float, supply: float, awake: bool, h: float
+    m: ModelView, d: DataView, motor: int, reference: float, supply: float, awake: bool, h: float
 ) -> float:
     """Step a motor, its gear and its brake.
 
     Args:
-      wanted: speed of the wheel, rad/s. supply: voltage of the battery, V.
+      reference: speed of the wheel, rad/s. supply: voltage of the battery, V.
       awake: the brake is to be open. h: s.
 
     Returns:
@@ -129,13 +131,13 @@ def step_motor(
     filtered, boost, rise = act[at + FILTERED], act[at + BOOST], act[at + RISE]
     opened, windup = act[at + OPEN], act[at + WINDUP]
     spin = spin_of(m, d, motor)
-    whole = user[motor, CONSTANT] * user[motor, GEAR]
-    emf = whole * spin
+    wheel_constant = user[motor, CONSTANT] * user[motor, GEAR]
+    emf = wheel_constant * spin
     resistance = resistance_at(user, motor, rise)
     voltage, current = emf, 0.0
     if awake or opened > 0.0:
-        voltage, current = law.drawn(
-            user[motor, CALIBRATION] * wanted + user[motor, COMPENSATION] * filtered,
+        voltage, current = law.motor_operating_point(
+            user[motor, CALIBRATION] * reference + user[motor, COMPENSATION] * filtered,
             emf,
             resistance,
             limit_of(user, motor, boost, rise),
@@ -143,26 +145,26 @@ def step_motor(
         )
     change = h / user[motor, OPENING] if awake else -h / user[motor, CLOSING]
     opened = law.clip(opened + change, 0.0, 1.0)
-    most = max(user[motor, BRAKE_TORQUE] * (1.0 - opened), user[motor, DRAG])
+    brake_torque = max(user[motor, BRAKE_TORQUE] * (1.0 - opened), user[motor, DRAG])
     new_windup, braking = law.brake_step(
-        windup, spin, most, user[motor, STIFFNESS], user[motor, DAMPING], h
+        windup, spin, brake_torque, user[motor, STIFFNESS], user[motor, DAMPING], h
     )
-    shaft = whole * current
-    rubbing = law.gear_friction(
+    shaft = wheel_constant * current
+    friction = law.gear_friction(
         shaft, spin, user[motor, EFFICIENCY], user[motor, FRICTION], user[motor, FADE]
     )
     heat = current * current * resistance
     steady = user[motor, CONTINUOUS] * user[motor, CONTINUOUS]
     above = user[motor, BOOST_CURRENT] * user[motor, BOOST_CURRENT] - steady
-    spent = (current * current - steady) / (above * user[motor, BOOST_TIME])
+    boost_rate = (current * current - steady) / (above * user[motor, BOOST_TIME])
     rate[at + FILTERED] = (current - filtered) / (user[motor, LAG] + h)
-    rate[at + BOOST] = (law.clip(boost + h * spent, 0.0, 1.0) - boost) / h
+    rate[at + BOOST] = (law.clip(boost + h * boost_rate, 0.0, 1.0) - boost) / h
     rate[at + RISE] = (heat - rise / user[motor, THERMAL]) / user[motor, HEAT_CAPACITY]
     rate[at + OPEN] = (opened - act[at + OPEN]) / h
     rate[at + WINDUP] = (new_windup - windup) / h
     rate[at + VOLTS] = (voltage - act[at + VOLTS]) / h
     rate[at + AMPERES] = (current - act[at + AMPERES]) / h
-    rate[at + TORQUE] = (shaft - rubbing - braking - act[at + TORQUE]) / h
+    rate[at + TORQUE] = (shaft - friction - braking - act[at + TORQUE]) / h
     return voltage * current
 
 
@@ -171,27 +173,27 @@ def act_dyn(m: ModelView, d: DataView, drive: int) -> None:
     """Step a whole drive: joystick, references, both motors, battery."""
     user, act, rate, h = m.actuator_user, d.act, d.act_dot, m.timestep
     at = m.actuator_actadr[drive]
-    charge, source, internal = unloaded(user, drive, act[at + USED])
+    charge, source, internal = battery_without_load(user, drive, act[at + USED])
     supply = source - act[at + SAG]
-    share = h / (user[drive, TREMOR] + h)
-    x = act[at + X] + share * (stick(m, d, drive - block.X_BEFORE) - act[at + X])
-    y = act[at + Y] + share * (stick(m, d, drive - block.Y_BEFORE) - act[at + Y])
-    ahead = law.shaped(x, user[drive, DEADBAND], user[drive, CURVE])
-    aside = law.shaped(y, user[drive, DEADBAND], user[drive, CURVE])
+    filter_gain = h / (user[drive, TREMOR] + h)
+    x = act[at + X] + filter_gain * (joystick_axis(m, d, drive - block.X_BEFORE) - act[at + X])
+    y = act[at + Y] + filter_gain * (joystick_axis(m, d, drive - block.Y_BEFORE) - act[at + Y])
+    ahead = law.joystick_demand(x, user[drive, DEADBAND], user[drive, CURVE])
+    aside = law.joystick_demand(y, user[drive, DEADBAND], user[drive, CURVE])
     if charge <= 0.0:  # an empty battery: as if the joystick were released
         ahead, aside = 0.0, 0.0
     speed, turn = act[at + SPEED], act[at + TURN]
-    wanted = ahead * (user[drive, FORWARD_SPEED] if ahead > 0.0 else user[drive, REVERSE_SPEED])
-    forward = speed > 0.0 or (speed == 0.0 and wanted > 0.0)
-    new_speed = law.ramped(
+    reference = ahead * (user[drive, FORWARD_SPEED] if ahead > 0.0 else user[drive, REVERSE_SPEED])
+    forward = speed > 0.0 or (speed == 0.0 and reference > 0.0)
+    new_speed = law.ramp_step(
         speed,
-        wanted,
+        reference,
         user[drive, FORWARD_UP] if forward else user[drive, REVERSE_UP],
         user[drive, FORWARD_DOWN] if forward else user[drive, REVERSE_DOWN],
         user[drive, FAST_BRAKE],
         h,
     )
-    new_turn = law.ramped(
+    new_turn = law.ramp_step(
         turn,
         aside * user[drive, TURN_SPEED],
         user[drive, TURN_UP],
@@ -204,13 +206,13 @@ def act_dyn(m: ModelView, d: DataView, drive: int) -> None:
     awake = user[drive, DELAY] + h if moving else max(act[at + AWAKE] - h, 0.0)
 
     left, right = drive - block.LEFT_BEFORE, drive - block.RIGHT_BEFORE
-    apart = 0.5 * new_turn * user[drive, TRACK]
+    half_difference = 0.5 * new_turn * user[drive, TRACK]
     power = user[drive, STANDBY]
     power += step_motor(
-        m, d, left, (new_speed - apart) / user[drive, RADIUS], supply, awake > 0.0, h
+        m, d, left, (new_speed - half_difference) / user[drive, RADIUS], supply, awake > 0.0, h
     )
     power += step_motor(
-        m, d, right, (new_speed + apart) / user[drive, RADIUS], supply, awake > 0.0, h
+        m, d, right, (new_speed + half_difference) / user[drive, RADIUS], supply, awake > 0.0, h
     )
     current = law.battery_current(power, source, internal)
     rate[at + X] = (x - act[at + X]) / h
@@ -227,7 +229,7 @@ def act_dyn(m: ModelView, d: DataView, drive: int) -> None:
 def sense_drive(m: ModelView, d: DataView, drive: int, adr: int) -> None:
     """Fill the sensor `drive`; its components are named in mjchair.drive.block."""
     at, h, out = m.actuator_actadr[drive], m.timestep, d.sensordata
-    charge, source, _ = unloaded(m.actuator_user, drive, d.act[at + USED])
+    charge, source, _ = battery_without_load(m.actuator_user, drive, d.act[at + USED])
     current = d.act[at + CURRENT] + h * d.act_dot[at + CURRENT]
     left = m.actuator_actadr[drive - block.LEFT_BEFORE]
     right = m.actuator_actadr[drive - block.RIGHT_BEFORE]

@@ -37,14 +37,14 @@ Array = NDArray[np.float64]
 
 ALONG, ACROSS = 96, 4  # columns on either side of the middle one
 COLUMNS = (2 * ALONG + 1) * (2 * ACROSS + 1)
-WIDEST = 1.3  # rad, up to which the columns go round the tire on either side
+LARGEST_ANGLE = 1.3  # rad, up to which the columns go round the tire on either side
 # of the half width: where the outermost column stands is FAR; inside they stand as densely as if
 # they were evenly spaced up to NEAR
 NEAR, FAR = 0.15, 0.95
-EXACT = 1e-12  # of the depth, to which the plane's height is computed
-SPARE = 3.0  # times the tire's rise under the ground's top: how much of it gets columns
-MOST_LOOKS = 3  # iterations of the search for the highest ground under the tire
-MOST_TURNS = 20  # iterations for the plane's height; two or three are enough, on a plane none
+HEIGHT_TOLERANCE = 1e-12  # of the depth, to which the plane's height is computed
+RISE_FACTOR = 3.0  # times the tire's rise under the ground's top: how much of it gets columns
+MAX_TOP_ITERATIONS = 3  # of the search for the highest ground under the tire
+MAX_HEIGHT_ITERATIONS = 20  # for the plane's height; two or three are enough, on a plane none
 
 
 class HeightField(NamedTuple):
@@ -107,14 +107,14 @@ class Dent(NamedTuple):
 @register_jitable(forceinline=True)
 def place_along(i: int) -> tuple[float, float]:
     """Where the i-th row of columns stands, of the radius, and its width: even in the angle."""
-    angle = WIDEST * i / ALONG
-    return math.sin(angle), WIDEST / ALONG * math.cos(angle)
+    angle = LARGEST_ANGLE * i / ALONG
+    return math.sin(angle), LARGEST_ANGLE / ALONG * math.cos(angle)
 
 
 @register_jitable(forceinline=True)
 def row_at(part: float) -> int:
     """The last row that stands no farther than that part of the radius."""
-    return min(int(math.asin(min(max(part, 0.0), 1.0)) / WIDEST * ALONG), ALONG)
+    return min(int(math.asin(min(max(part, 0.0), 1.0)) / LARGEST_ANGLE * ALONG), ALONG)
 
 
 @register_jitable(forceinline=True)
@@ -148,7 +148,7 @@ def ground_at(field: HeightField, x: float, y: float) -> tuple[bool, float, floa
 
 
 @register_jitable
-def in_frame(geoms: Geoms, ground: int, tire: int) -> Ellipsoid:
+def tire_in_field_frame(geoms: Geoms, ground: int, tire: int) -> Ellipsoid:
     """The tire in the ground's frame."""
     pos, mat, size = geoms
     middle, axes = np.zeros(3), np.zeros((3, 3))
@@ -180,11 +180,11 @@ def cap_reach(shape: Array, cosine: float, x: float, y: float) -> float:
       shape: `quadric` of power 2. cosine: of the angle from the lowest point to the cap's rim,
         where the tire is stretched to a ball; 0 or more.
     """
-    far = math.sqrt(x * x * shape[0, 0] + 2.0 * x * y * shape[0, 1] + y * y * shape[1, 1])
-    towards = -(x * shape[0, 2] + y * shape[1, 2]) / (far * math.sqrt(shape[2, 2]))
+    distance = math.sqrt(x * x * shape[0, 0] + 2.0 * x * y * shape[0, 1] + y * y * shape[1, 1])
+    towards = -(x * shape[0, 2] + y * shape[1, 2]) / (distance * math.sqrt(shape[2, 2]))
     if towards >= cosine:
-        return far
-    return far * (
+        return distance
+    return distance * (
         towards * cosine
         + math.sqrt(max(1.0 - towards * towards, 0.0)) * math.sqrt(max(1.0 - cosine * cosine, 0.0))
     )
@@ -197,7 +197,9 @@ def cap_cosine(shape: Array, rise: float) -> float:
 
 
 @register_jitable
-def highest(field: HeightField, low_x: float, high_x: float, low_y: float, high_y: float) -> float:
+def highest_ground(
+    field: HeightField, low_x: float, high_x: float, low_y: float, high_y: float
+) -> float:
     """Height (m) of the field's highest point in the cells that a rectangle touches."""
     nrow, ncol = field.nrow, field.ncol
     dx = 2.0 * field.half_x / (ncol - 1)
@@ -222,11 +224,11 @@ def top_underneath(middle: Array, shape: Array, field: HeightField, margin: floa
     """
     top = field.top + margin
     lowest = middle[2] - math.sqrt(shape[2, 2])
-    for _ in range(MOST_LOOKS):
+    for _ in range(MAX_TOP_ITERATIONS):
         if lowest >= top:
             break
         cosine = cap_cosine(shape, top - lowest)
-        near = highest(
+        near = highest_ground(
             field,
             middle[0] - cap_reach(shape, cosine, -1.0, 0.0),
             middle[0] + cap_reach(shape, cosine, 1.0, 0.0),
@@ -243,7 +245,7 @@ def stand_columns(tire: Ellipsoid, shape: Array, top: float, columns: Array) -> 
 
     Args:
       tire: in the field's frame. shape: `quadric` of power 2.
-      top: m; as much of the tire gets columns as is up to `SPARE` times that above its lowest
+      top: m; as much of the tire gets columns as is up to `RISE_FACTOR` times that above its lowest
         point, for the plane that stands for the ground may rise higher than the ground.
       columns: (4, COLUMNS) to fill: place from the middle along x and y (m), height of the
         tire's underside (m), weight (1).
@@ -256,15 +258,15 @@ def stand_columns(tire: Ellipsoid, shape: Array, top: float, columns: Array) -> 
     rise = top - (middle[2] - reach)
     if rise <= 0.0:
         return 0
-    keep = middle[2] - reach + SPARE * rise
+    limit = middle[2] - reach + RISE_FACTOR * rise
     inverse = quadric(tire, -2)
     lowest_x, lowest_y = -shape[0, 2] / reach, -shape[1, 2] / reach
     ex, ey = axes[1, 2], -axes[0, 2]
-    long = math.sqrt(ex * ex + ey * ey)
-    if long < 1e-9:  # it lies on its side and rolls nowhere
-        ex, ey, long = 1.0, 0.0, 1.0
-    ex, ey = ex / long, ey / long
-    cosine, lowest_e = cap_cosine(shape, SPARE * rise), lowest_x * ex + lowest_y * ey
+    length = math.sqrt(ex * ex + ey * ey)
+    if length < 1e-9:  # it lies on its side and rolls nowhere
+        ex, ey, length = 1.0, 0.0, 1.0
+    ex, ey = ex / length, ey / length
+    cosine, lowest_e = cap_cosine(shape, RISE_FACTOR * rise), lowest_x * ex + lowest_y * ey
     ahead = row_at((cap_reach(shape, cosine, ex, ey) - lowest_e) / tire.half[0])
     behind = row_at((cap_reach(shape, cosine, -ex, -ey) + lowest_e) / tire.half[0])
     count = 0
@@ -283,7 +285,7 @@ def stand_columns(tire: Ellipsoid, shape: Array, top: float, columns: Array) -> 
             if root <= 0.0:
                 continue
             under = middle[2] - (b + math.sqrt(root)) / inverse[2, 2]
-            if under >= keep:
+            if under >= limit:
                 continue
             columns[0, count], columns[1, count] = x, y
             columns[2, count], columns[3, count] = under, width * breadth
@@ -292,10 +294,12 @@ def stand_columns(tire: Ellipsoid, shape: Array, top: float, columns: Array) -> 
 
 
 @register_jitable
-def press(columns: Array, count: int, middle: Array, field: HeightField, margin: float) -> Dent:
+def dent_of_ground(
+    columns: Array, count: int, middle: Array, field: HeightField, margin: float
+) -> Dent:
     """The dent that the ground, lifted by the margin, makes in the columns."""
-    force, energy, slope_x, slope_y, high = 0.0, 0.0, 0.0, 0.0, 0.0
-    far_x, far_y, top = 0.0, 0.0, field.top + margin
+    force, energy, slope_x, slope_y, heights = 0.0, 0.0, 0.0, 0.0, 0.0
+    place_x, place_y, top = 0.0, 0.0, field.top + margin
     for i in range(count):
         x, y, under = columns[0, i], columns[1, i], columns[2, i]
         if under >= top:
@@ -309,13 +313,13 @@ def press(columns: Array, count: int, middle: Array, field: HeightField, margin:
         energy += 0.5 * push * depth
         slope_x += push * steep_x
         slope_y += push * steep_y
-        high += push * (height + margin)
-        far_x += push * x
-        far_y += push * y
+        heights += push * (height + margin)
+        place_x += push * x
+        place_y += push * y
     if force == 0.0:
         return Dent(0.0, 0.0, 0.0, 0.0, 0.0)
     slope_x, slope_y = slope_x / force, slope_y / force
-    height = (high - slope_x * far_x - slope_y * far_y) / force
+    height = (heights - slope_x * place_x - slope_y * place_y) / force
     return Dent(force, energy, slope_x, slope_y, height)
 
 
@@ -326,10 +330,10 @@ def height_of_plane(columns: Array, count: int, dent: Dent) -> tuple[float, floa
     Newton's method on the cube root of the energy, which is nearly linear in the height.
 
     Returns:
-      Height, and the force there, as `press` has it (m).
+      Height, and the force there, as `dent_of_ground` has it (m).
     """
     height, force = dent.height, 0.0
-    for _ in range(MOST_TURNS):
+    for _ in range(MAX_HEIGHT_ITERATIONS):
         energy, force = 0.0, 0.0
         for i in range(count):
             ground = height + dent.slope_x * columns[0, i] + dent.slope_y * columns[1, i]
@@ -341,13 +345,13 @@ def height_of_plane(columns: Array, count: int, dent: Dent) -> tuple[float, floa
             break
         step = 3.0 * (math.pow(dent.energy * energy * energy, 1.0 / 3.0) - energy) / force
         height += step
-        if abs(step) <= EXACT * energy / force:
+        if abs(step) <= HEIGHT_TOLERANCE * energy / force:
             break
     return height, force
 
 
 @register_jitable
-def meet(
+def contact_with_plane(
     middle: Array, shape: Array, slope_x: float, slope_y: float, height: float
 ) -> tuple[float, Array, Array]:
     """The contact of the tire with a plane through (middle x, middle y, height), in its frame.
@@ -370,7 +374,7 @@ def meet(
 
 
 @register_jitable
-def touch(
+def tire_contact(
     geoms: Geoms, ground: int, wheel: int, field: HeightField, margin: float, out: Array
 ) -> bool:
     """The contact of an ellipsoid tire with a height field.
@@ -385,24 +389,26 @@ def touch(
     Returns:
       Whether there is a contact.
     """
-    tire = in_frame(geoms, ground, wheel)
+    tire = tire_in_field_frame(geoms, ground, wheel)
     shape = quadric(tire, 2)
     top = top_underneath(tire.middle, shape, field, margin)
     columns = np.empty((4, COLUMNS))
     count = stand_columns(tire, shape, top, columns)
-    dent = press(columns, count, tire.middle, field, margin)
+    dent = dent_of_ground(columns, count, tire.middle, field, margin)
     if dent.force == 0.0:
         return False
     height, plane_force = height_of_plane(columns, count, dent)
-    far, normal, place = meet(tire.middle, shape, dent.slope_x, dent.slope_y, height - margin)
-    if far >= margin or plane_force == 0.0:
+    distance, normal, place = contact_with_plane(
+        tire.middle, shape, dent.slope_x, dent.slope_y, height - margin
+    )
+    if distance >= margin or plane_force == 0.0:
         return False
-    far = margin + (far - margin) * dent.force / plane_force
+    distance = margin + (distance - margin) * dent.force / plane_force
     pos, mat = geoms.pos, geoms.mat
-    out[0] = far
+    out[0] = distance
     for i in range(3):
         out[1 + i], out[4 + i] = pos[ground, i], 0.0
         for j in range(3):
-            out[1 + i] += mat[ground, 3 * i + j] * (place[j] - 0.5 * far * normal[j])
+            out[1 + i] += mat[ground, 3 * i + j] * (place[j] - 0.5 * distance * normal[j])
             out[4 + i] += mat[ground, 3 * i + j] * normal[j]
     return True

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.engine import collision, native
-from mjchair.engine.contact import contact_patch, share_load
+from mjchair.engine.contact import contact_patch, share_stiffness
 from mjchair.engine.views import data_view, model_view
 from mjchair.engine.wheel import wheel_axes
 
@@ -63,7 +63,7 @@ def ground_contacts(
     for geom in geoms:
         patch = contact_patch(d, geom)
         if patch[0] > 1:
-            patch = share_load(m, d, geom)
+            patch = share_stiffness(m, d, geom)
         _, nx, ny, nz, px, py, pz, ground = patch
         if ground >= 0:
             axes = wheel_axes(d, geom, nx, ny, nz)

@@ -184,7 +184,7 @@ def field_contact() -> Any:
             model.hfield_size[which, 1],
             model.hfield_size[which, 2],
         )
-        return 1 if field.touch(geoms, ground, tire, heights, margin, out) else 0
+        return 1 if field.tire_contact(geoms, ground, tire, heights, margin, out) else 0
 
     return contact
 

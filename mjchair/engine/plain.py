@@ -82,7 +82,7 @@ def field_contact() -> Any:
             _array(model.hfield_ncol, whole, (fields,))[which],
             *size[:3],
         )
-        return 1 if field.touch(geoms, ground, tire, heights, margin, out) else 0
+        return 1 if field.tire_contact(geoms, ground, tire, heights, margin, out) else 0
 
     return CONTACT(contact)
 

@@ -29,7 +29,7 @@ from mujoco import mjtDyn, mjtObj, mjtSensor, mjtTrn
 from numba.extending import register_jitable
 
 from mjchair.engine import drivetrain
-from mjchair.engine.contact import contact_load, contact_patch, dot, share_load
+from mjchair.engine.contact import contact_load, contact_patch, dot, share_stiffness
 from mjchair.engine.views import DataView, ModelView
 from mjchair.tire import block, law
 
@@ -175,7 +175,7 @@ def act_dyn(m: ModelView, d: DataView, actuator: int) -> None:
     h = m.timestep
     count, nx, ny, nz, px, py, pz, ground = contact_patch(d, geom)
     if count > 1:
-        _, nx, ny, nz, px, py, pz, ground = share_load(m, d, geom)
+        _, nx, ny, nz, px, py, pz, ground = share_stiffness(m, d, geom)
     old = law.Deflection(d.act[at], d.act[at + 1], d.act[at + 2])
     load = d.act[at + 3]
     force = d.xfrc_applied

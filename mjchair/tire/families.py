@@ -1,8 +1,8 @@
 """The formula families that a tire may have, and the functions that choose by the block's number.
 
-In: one record of each family, from mjchair.tire.formula. Out: `FAMILIES` by name, and `choice`,
-which makes one compiled function of those of all families. A new family is its file there and its
-record in `REGISTERED` here.
+In: one record of each family, from mjchair.tire.formula. Out: `FAMILIES` by name, and
+`choose_by_number`, which makes one compiled function of those of all families. A new family is its
+file there and its record in `REGISTERED` here.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ REGISTERED = (linear.LINEAR, linear.QUADRATIC, pac89.PAC89, mf61.MF52, mf61.MF61
 FAMILIES: dict[str, Family] = {family.name: family for family in REGISTERED}
 
 
-def choice(functions: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
+def choose_by_number(functions: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
     """One compiled function out of those of the families, which looks at the block's number.
 
     Args:

@@ -18,7 +18,7 @@ from numba.extending import register_jitable
 
 from mjchair.tire import block
 from mjchair.tire.block import Block
-from mjchair.tire.families import REGISTERED, choice
+from mjchair.tire.families import REGISTERED, choose_by_number
 from mjchair.tire.transient import relax
 
 
@@ -102,9 +102,9 @@ class TireForce(NamedTuple):
 TURNING_RATE = 0.05  # rad/s, over which the turning moment's sign is smoothed; assumed
 
 # those of the family that a block names; what they take and give: mjchair.tire.formula.family
-family_forces = choice([family.forces for family in REGISTERED])
-family_stiffness = choice([family.stiffness for family in REGISTERED])
-own_relaxation = choice([family.relaxation for family in REGISTERED])
+family_forces = choose_by_number([family.forces for family in REGISTERED])
+family_stiffness = choose_by_number([family.stiffness for family in REGISTERED])
+formula_relaxation = choose_by_number([family.relaxation for family in REGISTERED])
 
 
 @register_jitable
@@ -112,7 +112,7 @@ def family_relaxation(p: Block, fz: float, c_kappa: float, c_alpha: float) -> tu
     """Relaxation lengths (m) along and across: the block's, or the family's own where that is 0."""
     x, y = p[block.RELAXATION_X], p[block.RELAXATION_Y]
     if x == 0.0 or y == 0.0:
-        own_x, own_y = own_relaxation(p, fz, c_kappa, c_alpha)
+        own_x, own_y = formula_relaxation(p, fz, c_kappa, c_alpha)
         x = own_x if x == 0.0 else x
         y = own_y if y == 0.0 else y
     return x, y
@@ -172,7 +172,7 @@ def norm(x: float, y: float) -> float:
 
 
 @register_jitable
-def held_slip(
+def limit_deflections(
     u: float,
     w: float,
     limits: tuple[float, float],
@@ -180,14 +180,21 @@ def held_slip(
     motion: Motion,
     slide_speed: float,
 ) -> tuple[float, float]:
-    """Deflections cut back where the tire slides, so that nothing winds up.
+    """Limit the deflections of a tire that slides, so that they do not grow while it slides.
 
-    A deflection may stand for the slip of full sliding (three times peak over stiffness, D/C; that
-    makes the two `limits`, m), or for the kinematic slip where that is more. `sigma` are the two
-    relaxation lengths (m). `slide_speed` is added to the rolling speed of a
-    wheel that slides without rolling. For a wheel that rolls, however slowly, almost nothing is
-    added, and up to twice its slip is allowed: rolling itself reduces its deflections, and a limit
-    that followed every small change of its slip would make the wheel vibrate.
+    A deflection may reach the slip of full sliding, or the kinematic slip where that is larger. A
+    wheel that rolls may have up to twice its kinematic slip: rolling itself reduces its
+    deflections, and a limit that follows every small change of the slip makes the wheel vibrate.
+
+    Args:
+      u, w: deflections along and across, m. limits: the two deflections at full sliding, m: three
+        times peak over stiffness (3 D/C), times the relaxation length.
+      sigma: the two relaxation lengths, m. motion: of the wheel. slide_speed: m/s, added to the
+        rolling speed of a wheel that slides without rolling; where it rolls, however slowly,
+        almost nothing is added.
+
+    Returns:
+      The limited deflections, m.
     """
     size = norm(u / limits[0], w / limits[1])
     if size <= 1.0:
@@ -229,7 +236,7 @@ def step_tire(
     peak *= road.friction
     c_kappa, c_alpha, d_x, d_y = c_kappa * slope, c_alpha * slope, d_x * peak, d_y * peak
 
-    u, w = held_slip(
+    u, w = limit_deflections(
         relax(old.longitudinal, motion.vsx, vx, sigma_x, h),
         relax(old.lateral, motion.vsy, vx, sigma_y, h),
         (3.0 * sigma_x * d_x / c_kappa, 3.0 * sigma_y * d_y / c_alpha),

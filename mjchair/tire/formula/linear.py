@@ -44,7 +44,7 @@ def forces(
     speed: float,
     direction: float,
 ) -> tuple[float, float, float, float, float]:
-    """Steady-state forces and moments; see mjchair.tire.formula. No camber, no speed."""
+    """Steady-state forces and moments; see mjchair.tire.formula.family. No camber, no speed."""
     c = cornering_stiffness(p, fz)
     fx = c * kappa
     fy = -c * math.atan(tan_alpha)

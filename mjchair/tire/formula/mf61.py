@@ -34,14 +34,14 @@ from numba.extending import register_jitable
 
 from mjchair.tire.block import FAMILY, RADIUS, Block
 from mjchair.tire.formula.family import Family
-from mjchair.tire.formula.mf_fold import AT, fold
+from mjchair.tire.formula.mf_constants import AT, run_constants
 from mjchair.tire.formula.mf_names import NAMES_52, NAMES_61
 
 NUMBER_52, NUMBER_61 = 3, 4  # of the families, in a block
 BELT_FRICTION = 5.0  # peak force over load: racing tires on test belts pass 3; an assumption
 
-SHORTEST = 0.3  # of the radius: shorter relaxation would be too stiff for a light wheel at 2 ms
-LENGTH = 0.5  # of the radius, where the file has neither stiffness nor length; an assumption
+SHORTEST_RELAXATION = 0.3  # of the radius: a shorter one is too stiff for a light wheel at 2 ms
+ASSUMED_RELAXATION = 0.5  # of the radius, where the file gives neither; an assumption
 
 
 @register_jitable
@@ -51,8 +51,8 @@ def clamp(x: float, low: float, high: float) -> float:
 
 
 @register_jitable
-def kept(change: float, nominal: float) -> float:
-    """nominal + change, kept from turning its sign: at least a twentieth of `nominal` is left.
+def keep_sign(change: float, nominal: float) -> float:
+    """nominal + change, which keeps the sign of `nominal`: at least a twentieth of it is left.
 
     Far from the nominal load, or at great camber, the linear terms of the formula would do it.
     """
@@ -67,27 +67,27 @@ def sign(x: float) -> float:
 
 
 @register_jitable
-def curve(x: float, b: float, c: float, e: float) -> float:
+def sine_curve(x: float, b: float, c: float, e: float) -> float:
     """sin(C atan(Bx - E (Bx - atan Bx))), the Magic Formula over its peak."""
     bx = b * x
     return math.sin(c * math.atan(bx - e * (bx - math.atan(bx))))
 
 
 @register_jitable
-def weight(x: float, b: float, c: float, e: float) -> float:
+def cosine_curve(x: float, b: float, c: float, e: float) -> float:
     """cos(C atan(Bx - E (Bx - atan Bx))), the shape of trail and of combined slip."""
     bx = b * x
     return math.cos(c * math.atan(bx - e * (bx - math.atan(bx))))
 
 
 @register_jitable
-def share(x: float, shift: float, b: float, c: float, e: float) -> float:
-    """What combined slip leaves of a force: `weight` at x + shift over that at the shift."""
+def combined_factor(x: float, shift: float, b: float, c: float, e: float) -> float:
+    """What combined slip leaves of a force: `cosine_curve` at x + shift over that at the shift."""
     if b == 0.0 or c == 0.0:
         return 1.0
     if shift == 0.0:
-        return weight(x, b, c, e)
-    return weight(x + shift, b, c, e) / weight(shift, b, c, e)
+        return cosine_curve(x, b, c, e)
+    return cosine_curve(x + shift, b, c, e) / cosine_curve(shift, b, c, e)
 
 
 @register_jitable
@@ -99,28 +99,28 @@ def camber_of(p: Block, gamma: float) -> float:
 @register_jitable
 def slip_stiffness(p: Block, fz: float, dfz: float) -> float:
     """Kxk (N), (4.E15)."""
-    return fz * kept(p[AT.KX2] * dfz, p[AT.KX1]) * math.exp(p[AT.KX3] * dfz)
+    return fz * keep_sign(p[AT.KX2] * dfz, p[AT.KX1]) * math.exp(p[AT.KX3] * dfz)
 
 
 @register_jitable
 def cornering_stiffness(p: Block, fz: float, camber: float) -> float:
     """Kya (N/rad), with the formula's own sign, (4.E25). camber: `camber_of`."""
-    x = fz / (p[AT.F0] * kept(p[AT.KY5] * camber * camber, p[AT.KY2]))
+    x = fz / (p[AT.F0] * keep_sign(p[AT.KY5] * camber * camber, p[AT.KY2]))
     c = p[AT.KY4]
     peak = 2.0 * x / (1.0 + x * x) if c == 2.0 else math.sin(c * math.atan(x))
-    return p[AT.KY1] * kept(-p[AT.KY3] * abs(camber), 1.0) * peak
+    return p[AT.KY1] * keep_sign(-p[AT.KY3] * abs(camber), 1.0) * peak
 
 
 @register_jitable
 def friction_x(p: Block, dfz: float, gamma: float) -> float:
     """Longitudinal peak friction, (4.E13)."""
-    return kept(p[AT.MUX2] * dfz, p[AT.MUX1]) * kept(-p[AT.MUX3] * gamma * gamma, 1.0)
+    return keep_sign(p[AT.MUX2] * dfz, p[AT.MUX1]) * keep_sign(-p[AT.MUX3] * gamma * gamma, 1.0)
 
 
 @register_jitable
 def friction_y(p: Block, dfz: float, camber: float) -> float:
     """Lateral peak friction, with the formula's own sign, (4.E23)."""
-    return kept(p[AT.MUY2] * dfz, p[AT.MUY1]) * kept(-p[AT.MUY3] * camber * camber, 1.0)
+    return keep_sign(p[AT.MUY2] * dfz, p[AT.MUY1]) * keep_sign(-p[AT.MUY3] * camber * camber, 1.0)
 
 
 @register_jitable
@@ -134,7 +134,7 @@ def pure_fx(
     x = kappa + direction * (p[AT.HX1] + p[AT.HX2] * dfz)
     e = (p[AT.EX1] + p[AT.EX2] * dfz + p[AT.EX3] * dfz * dfz) * (1.0 - p[AT.EX4] * sign(x))
     shift = direction * fz * (p[AT.VX1] + p[AT.VX2] * dfz)
-    return d * curve(x, kxk / (p[AT.CX] * d), p[AT.CX], min(e, 1.0)) + shift
+    return d * sine_curve(x, kxk / (p[AT.CX] * d), p[AT.CX], min(e, 1.0)) + shift
 
 
 @register_jitable
@@ -173,27 +173,27 @@ def pure_fy(
     y = slip + sh
     skew = (p[AT.EY3] * direction + p[AT.EY4] * camber) * sign(y)
     e = (p[AT.EY1] + p[AT.EY2] * dfz) * (1.0 + p[AT.EY5] * camber * camber - skew)
-    return d * curve(y, kya / (p[AT.CY] * d), p[AT.CY], min(e, 1.0)) + sv
+    return d * sine_curve(y, kya / (p[AT.CY] * d), p[AT.CY], min(e, 1.0)) + sv
 
 
 @register_jitable
-def share_x(
+def combined_factor_x(
     p: Block, dfz: float, kappa: float, slip: float, camber: float, direction: float
 ) -> float:
     """Gxa, what side slip leaves of Fx, (4.E51)-(4.E57)."""
     turn = p[AT.BXA_K] * kappa
     b = (p[AT.BXA] + p[AT.BXA_G] * camber * camber) / math.sqrt(1.0 + turn * turn)
     e = min(p[AT.EXA1] + p[AT.EXA2] * dfz, 1.0)
-    return share(slip, direction * p[AT.HXA], b, p[AT.CXA], e)
+    return combined_factor(slip, direction * p[AT.HXA], b, p[AT.CXA], e)
 
 
 @register_jitable
-def share_y(p: Block, dfz: float, kappa: float, slip: float, camber: float) -> float:
+def combined_factor_y(p: Block, dfz: float, kappa: float, slip: float, camber: float) -> float:
     """Gyk, what longitudinal slip leaves of Fy, (4.E59)-(4.E65)."""
     turn = p[AT.BYK_A] * (slip - p[AT.BYK_0])
     b = (p[AT.BYK] + p[AT.BYK_G] * camber * camber) / math.sqrt(1.0 + turn * turn)
     e = min(p[AT.EYK1] + p[AT.EYK2] * dfz, 1.0)
-    return share(kappa, p[AT.HYK1] + p[AT.HYK2] * dfz, b, p[AT.CYK], e)
+    return combined_factor(kappa, p[AT.HYK1] + p[AT.HYK2] * dfz, b, p[AT.CYK], e)
 
 
 @register_jitable
@@ -208,7 +208,7 @@ def induced_fy(p: Block, fz: float, dfz: float, kappa: float, slip: float, cambe
 
 
 @register_jitable
-def equivalent(slip: float, stretch: float) -> float:
+def equivalent_slip(slip: float, stretch: float) -> float:
     """The side slip that stands for combined slip in the moments, (A54) and (A55).
 
     Beyond 1.4 the tangent would run away and then turn round; from there on it is left out.
@@ -241,7 +241,7 @@ def trail(
     skew = p[AT.ET4] + p[AT.ET5] * camber
     if e != 0.0 and skew != 0.0:
         e *= 1.0 + skew * (2.0 / math.pi) * math.atan(b * p[AT.CT] * x)
-    return d * weight(equivalent(x, stretch), b, p[AT.CT], min(e, 1.0))
+    return d * cosine_curve(equivalent_slip(x, stretch), b, p[AT.CT], min(e, 1.0))
 
 
 @register_jitable
@@ -266,27 +266,27 @@ def residual_mz(
     if p[AT.BR10] != 0.0:
         dy = friction_y(p, dfz, camber) * fz
         b += p[AT.BR10] * (kya / dy if dy != 0.0 else 0.0)
-    bx = b * equivalent(x, stretch)
+    bx = b * equivalent_slip(x, stretch)
     return d * fz / math.sqrt(1.0 + bx * bx)
 
 
 @register_jitable
 def within_ellipse(
-    fx: float, fy: float, still_x: float, still_y: float, d_x: float, d_y: float
+    fx: float, fy: float, zero_slip_x: float, zero_slip_y: float, d_x: float, d_y: float
 ) -> tuple[float, float]:
     """Both forces cut to the friction ellipse, but neither alone to less than it was.
 
-    What is there without slip (still_x, still_y, N: shifts and camber) is no slip and
-    is not counted, so that pure slip keeps its curve.
+    The force at zero slip (zero_slip_x, zero_slip_y, N: shifts and camber) is not counted, so
+    that pure slip keeps its curve.
     """
     if d_x == 0.0 or d_y == 0.0:
         return fx, fy
-    slip_x, slip_y = fx - still_x, fy - still_y
+    slip_x, slip_y = fx - zero_slip_x, fy - zero_slip_y
     x, y = abs(slip_x / d_x), abs(slip_y / d_y)
     if x == 0.0 or y == 0.0:
         return fx, fy
     cut = max(1.0, x, y) / max(1.0, math.hypot(x, y), x, y)
-    return still_x + slip_x * cut, still_y + slip_y * cut
+    return zero_slip_x + slip_x * cut, zero_slip_y + slip_y * cut
 
 
 @register_jitable
@@ -325,7 +325,7 @@ def forces(
     speed: float,
     direction: float,
 ) -> tuple[float, float, float, float, float]:
-    """Steady-state forces and moments; see mjchair.tire.formula."""
+    """Steady-state forces and moments; see mjchair.tire.formula.family."""
     fz = min(fz, p[AT.FZ_MAX])
     kappa = clamp(kappa, p[AT.KAPPA_MIN], p[AT.KAPPA_MAX])
     slip = clamp(tan_alpha, p[AT.TAN_MIN], p[AT.TAN_MAX])
@@ -338,15 +338,15 @@ def forces(
 
     fx0 = pure_fx(p, fz, dfz, kappa, gamma, kxk, direction)
     fy0 = pure_fy(p, fz, dfz, slip, camber, kya, sh, sv, direction)
-    side = share_y(p, dfz, kappa, slip, camber)
+    factor_y = combined_factor_y(p, dfz, kappa, slip, camber)
     induced = induced_fy(p, fz, dfz, kappa, slip, camber)
-    fx = share_x(p, dfz, kappa, slip, camber, direction) * fx0
-    fy = side * fy0 + induced
+    fx = combined_factor_x(p, dfz, kappa, slip, camber, direction) * fx0
+    fy = factor_y * fy0 + induced
     if p[AT.BXA] == 0.0 and p[AT.BYK] == 0.0:
-        still_x = pure_fx(p, fz, dfz, 0.0, gamma, kxk, direction)
-        still_y = pure_fy(p, fz, dfz, 0.0, camber, kya, sh, sv, direction)
+        zero_slip_x = pure_fx(p, fz, dfz, 0.0, gamma, kxk, direction)
+        zero_slip_y = pure_fy(p, fz, dfz, 0.0, camber, kya, sh, sv, direction)
         d_x, d_y = friction_x(p, dfz, gamma) * fz, friction_y(p, dfz, camber) * fz
-        fx, fy = within_ellipse(fx, fy, still_x, still_y, d_x, d_y)
+        fx, fy = within_ellipse(fx, fy, zero_slip_x, zero_slip_y, d_x, d_y)
 
     stretch = (kxk * kappa / kya) ** 2 if kya != 0.0 else 0.0
     upright = fy0
@@ -357,7 +357,7 @@ def forces(
         sh0, sv0 = shifts_y(p, fz, dfz, 0.0, k0, direction)
         upright = pure_fy(p, fz, dfz, slip, 0.0, k0, sh0, sv0, direction)
     cosine = 1.0 / math.sqrt(1.0 + tan_alpha * tan_alpha)
-    mz = -trail(p, fz, dfz, slip, gamma, camber, stretch) * side * upright
+    mz = -trail(p, fz, dfz, slip, gamma, camber, stretch) * factor_y * upright
     mz += residual_mz(p, fz, dfz, slip, camber, kya, sh, sv, stretch)
     arm = p[AT.S1] + p[AT.S2] * fy + (p[AT.S3] + p[AT.S4] * dfz) * gamma
     mz = mz * cosine * direction + arm * fx
@@ -368,7 +368,7 @@ def forces(
 
 @register_jitable
 def stiffness(p: Block, fz: float, gamma: float, speed: float) -> tuple[float, float, float, float]:
-    """Slopes at zero slip and peaks; see mjchair.tire.formula."""
+    """Slopes at zero slip and peaks; see mjchair.tire.formula.family."""
     fz = min(fz, p[AT.FZ_MAX])
     gamma = clamp(gamma, p[AT.GAMMA_MIN], p[AT.GAMMA_MAX])
     dfz = fz / p[AT.F0] - 1.0
@@ -399,9 +399,9 @@ def relaxation(p: Block, fz: float, c_kappa: float, c_alpha: float) -> tuple[flo
         carcass_y = p[AT.SY1] + (p[AT.SY2] + p[AT.SY3] * dfz) * dfz
         x = c_kappa / carcass_x if carcass_x > 0.0 else 0.0
         y = c_alpha / carcass_y if carcass_y > 0.0 else 0.0
-    x = LENGTH * p[AT.R0] if p[AT.SX1] == 0.0 else abs(x)
-    y = LENGTH * p[AT.R0] if p[AT.SY1] == 0.0 else abs(y)
-    return max(x, SHORTEST * p[AT.R0]), max(y, SHORTEST * p[AT.R0])
+    x = ASSUMED_RELAXATION * p[AT.R0] if p[AT.SX1] == 0.0 else abs(x)
+    y = ASSUMED_RELAXATION * p[AT.R0] if p[AT.SY1] == 0.0 else abs(y)
+    return max(x, SHORTEST_RELAXATION * p[AT.R0]), max(y, SHORTEST_RELAXATION * p[AT.R0])
 
 
 MF52 = Family(
@@ -411,7 +411,7 @@ MF52 = Family(
     forces=forces,
     stiffness=stiffness,
     relaxation=relaxation,
-    pack=partial(fold, old=True),
+    pack=partial(run_constants, version_52=True),
     largest_friction=BELT_FRICTION,
 )
 MF61 = Family(
@@ -421,6 +421,6 @@ MF61 = Family(
     forces=forces,
     stiffness=stiffness,
     relaxation=relaxation,
-    pack=partial(fold, old=False),
+    pack=partial(run_constants, version_52=False),
     largest_friction=BELT_FRICTION,
 )

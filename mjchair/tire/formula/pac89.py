@@ -128,7 +128,7 @@ def slope_factor(bcd: float, c: float, d: float) -> float:
 
 
 @register_jitable
-def joined(
+def combined_curve(
     x: float,
     shift: float,
     share: float,
@@ -146,11 +146,11 @@ def joined(
     """
     if shift == 0.0:
         return share * magic_formula(x, b, c, d, e) + vertical / fade
-    unslipped = magic_formula(shift, b, c, d, e)
+    at_zero_slip = magic_formula(shift, b, c, d, e)
     if share == 1.0 and fade == 1.0:
         return magic_formula(x + shift, b, c, d, e) + vertical
-    change = magic_formula(x + shift, b, c, d, e) - unslipped
-    return share * change + (unslipped + vertical) / fade
+    change = magic_formula(x + shift, b, c, d, e) - at_zero_slip
+    return share * change + (at_zero_slip + vertical) / fade
 
 
 @register_jitable
@@ -163,7 +163,7 @@ def forces(
     speed: float,
     direction: float,
 ) -> tuple[float, float, float, float, float]:
-    """Steady-state forces and moments; see mjchair.tire.formula. `speed` is not used."""
+    """Steady-state forces and moments; see mjchair.tire.formula.family. `speed` is not used."""
     load = fz / p[LOAD_UNIT]
     camber = gamma * DEGREE
     cy, dy, ey, ky, shy, sv = lateral(p, load, camber)
@@ -185,20 +185,20 @@ def forces(
         x, y = math.copysign(rho * dx / kx, x), math.copysign(rho * dy / ky, y)
     fade_x = math.sqrt(1.0 + rho_y * rho_y)  # of what is there without longitudinal slip
     fade_y = math.sqrt(1.0 + rho_x * rho_x)
-    fx = joined(x, shx, share_x, bx, cx, dx, ex, 0.0, fade_x)
-    fy = joined(y, shy, share_y, by, cy, dy, ey, sv, fade_y)
+    fx = combined_curve(x, shx, share_x, bx, cx, dx, ex, 0.0, fade_x)
+    fy = combined_curve(y, shy, share_y, by, cy, dy, ey, sv, fade_y)
 
     if p[HAS_C] == 0.0:
         mz = brush_trail(p[PNEUMATIC_TRAIL], rho) * fy
     else:
         cz, dz, ez, kz, shz, svz = aligning(p, load, camber)
-        mz = -joined(y, shz, share_y, slope_factor(kz, cz, dz), cz, dz, ez, svz, fade_y)
+        mz = -combined_curve(y, shz, share_y, slope_factor(kz, cz, dz), cz, dz, ez, svz, fade_y)
     return fx, -fy, 0.0, 0.0, mz * direction
 
 
 @register_jitable
 def stiffness(p: Block, fz: float, gamma: float, speed: float) -> tuple[float, float, float, float]:
-    """Slopes at zero slip and peaks; see mjchair.tire.formula."""
+    """Slopes at zero slip and peaks; see mjchair.tire.formula.family."""
     load = fz / p[LOAD_UNIT]
     _, dy, _, ky, _, _ = lateral(p, load, gamma * DEGREE)
     _, dx, _, kx, _ = longitudinal(p, load)

@@ -1,9 +1,9 @@
-"""A Magic Formula 5.2 or 6.1/6.2 file, folded into the numbers that its equations take each step.
+"""Magic Formula 5.2 and 6.1/6.2: the constants of a run, computed once from the coefficients.
 
 In: the file's coefficients by name and the tire's radius. Out: the numbers of a block.
 
 Scaling factors, pressure and nominal load are constant in a run, so they are multiplied into the
-coefficients here, once. The order of the folded numbers is `FOLDED`.
+coefficients here, and not in each step. `CONSTANTS` has the names in the order of the block.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ _GROUPS = {
     "My": "LFZ Y1 Y2 Y3 Y4 Y5 Y6 Y7",
     "relaxation": "SX1 SX2 SX3 SY1 SY2 SY3",  # 6.1: stiffness over load; 5.2: lengths
 }
-FOLDED = tuple(name for names in _GROUPS.values() for name in names.split())
+CONSTANTS = tuple(name for names in _GROUPS.values() for name in names.split())
 # where each of them lies in the block: compiled code reads the attributes as constants
-AT: Any = namedtuple("AT", FOLDED)(*range(HEADER, HEADER + len(FOLDED)))
+AT: Any = namedtuple("AT", CONSTANTS)(*range(HEADER, HEADER + len(CONSTANTS)))
 
 
-def fold(given: Mapping[str, float], radius: float, old: bool) -> list[float]:
-    """The folded numbers, in the order of `FOLDED`.
+def run_constants(given: Mapping[str, float], radius: float, version_52: bool) -> list[float]:
+    """The constants, in the order of `CONSTANTS`.
 
     Args:
       given: coefficients by their .tir names. radius: m, where UNLOADED_RADIUS is not among them.
-      old: the file is of Magic Formula 5.2.
+      version_52: the file is of Magic Formula 5.2.
 
     Raises:
       MjchairError: no nominal load, no shape factor or no load of greatest stiffness.
@@ -59,19 +59,19 @@ def fold(given: Mapping[str, float], radius: float, old: bool) -> list[float]:
     if r0 <= 0.0 or f0 <= 0.0:
         raise MjchairError(f"UNLOADED_RADIUS {r0:g} m and load {f0:g} N; both must be above 0")
     dpi = pressure_change(c)
-    folded = (
+    constants = (
         {"F0": f0, "R0": r0}
         | _ranges(get)
         | _longitudinal(get, dpi)
-        | _lateral(get, dpi, f0, old)
+        | _lateral(get, dpi, f0, version_52)
         | _aligning(get, dpi, f0, r0)
         | _overturning(get, dpi, f0, r0)
-        | _rolling(get, dpi, r0, old)
-        | (_relaxation_52(get, f0, r0) if old else _relaxation_61(get, dpi))
+        | _rolling(get, dpi, r0, version_52)
+        | (_relaxation_52(get, f0, r0) if version_52 else _relaxation_61(get, dpi))
     )
-    if old:
-        _scale_camber(folded, get)
-    return [folded[name] for name in FOLDED]
+    if version_52:
+        _scale_camber(constants, get)
+    return [constants[name] for name in CONSTANTS]
 
 
 def pressure_change(c: Mapping[str, float]) -> float:
@@ -140,7 +140,7 @@ def _longitudinal(c: _Numbers, dpi: float) -> dict[str, float]:
     }
 
 
-def _lateral(c: _Numbers, dpi: float, f0: float, old: bool) -> dict[str, float]:
+def _lateral(c: _Numbers, dpi: float, f0: float, version_52: bool) -> dict[str, float]:
     mu = (1.0 + c.PPY3 * dpi + c.PPY4 * dpi**2) * c.LMUY
     best = 1.0 + c.PPY2 * dpi
     camber = (1.0 + c.PPY5 * dpi) * c.LKYC
@@ -164,7 +164,7 @@ def _lateral(c: _Numbers, dpi: float, f0: float, old: bool) -> dict[str, float]:
         "KYG2": c.PKY7 * camber,
         "HY1": c.PHY1 * c.LHY,
         "HY2": c.PHY2 * c.LHY,
-        "HY3": c.PHY3 * c.LKYC if old else 0.0,
+        "HY3": c.PHY3 * c.LKYC if version_52 else 0.0,
         "VY1": c.PVY1 * v,
         "VY2": c.PVY2 * v,
         "VY3": c.PVY3 * vg,
@@ -249,8 +249,8 @@ def _overturning(c: _Numbers, dpi: float, f0: float, r0: float) -> dict[str, flo
     }
 
 
-def _rolling(c: _Numbers, dpi: float, r0: float, old: bool) -> dict[str, float]:
-    pressure = 1.0 if old or c.QSY8 == 0.0 else max(1.0 + dpi, 0.0) ** c.QSY8
+def _rolling(c: _Numbers, dpi: float, r0: float, version_52: bool) -> dict[str, float]:
+    pressure = 1.0 if version_52 or c.QSY8 == 0.0 else max(1.0 + dpi, 0.0) ** c.QSY8
     r = r0 * c.FNOMIN * c.LMY * pressure
     v0 = c.LONGVL or DEFAULTS["LONGVL"]
     return {
@@ -259,9 +259,9 @@ def _rolling(c: _Numbers, dpi: float, r0: float, old: bool) -> dict[str, float]:
         "Y2": c.QSY2 * r / c.FNOMIN,
         "Y3": c.QSY3 * r / v0,
         "Y4": c.QSY4 * r / v0**4,
-        "Y5": 0.0 if old else c.QSY5 * r,
-        "Y6": 0.0 if old else c.QSY6 * r / c.FNOMIN,
-        "Y7": 1.0 if old else c.QSY7,
+        "Y5": 0.0 if version_52 else c.QSY5 * r,
+        "Y6": 0.0 if version_52 else c.QSY6 * r / c.FNOMIN,
+        "Y7": 1.0 if version_52 else c.QSY7,
     }
 
 
@@ -291,14 +291,14 @@ def _relaxation_52(c: _Numbers, f0: float, r0: float) -> dict[str, float]:
     }
 
 
-def _scale_camber(folded: dict[str, float], c: _Numbers) -> None:
+def _scale_camber(constants: dict[str, float], c: _Numbers) -> None:
     """5.2 scales the camber itself: LGAX in Fx, LGAY in Fy, LGAZ in Mz."""
-    folded["MUX3"] *= c.LGAX**2
-    folded["MUY3"] *= c.LGAY**2
-    folded["KY3"] *= abs(c.LGAY)
+    constants["MUX3"] *= c.LGAX**2
+    constants["MUY3"] *= c.LGAY**2
+    constants["KY3"] *= abs(c.LGAY)
     for name in ("EY4", "HY3", "VY3", "VY4"):
-        folded[name] *= c.LGAY
-    folded["BT5"] *= abs(c.LGAZ)
-    folded["DT4"] *= c.LGAZ**2
+        constants[name] *= c.LGAY
+    constants["BT5"] *= abs(c.LGAZ)
+    constants["DT4"] *= c.LGAZ**2
     for name in ("BT4", "DT3", "ET5", "HT3", "HT4", "DR8", "DR9"):
-        folded[name] *= c.LGAZ
+        constants[name] *= c.LGAZ
