@@ -122,8 +122,11 @@ TIME = np.arange(0.0, 2.0, 0.01)
 WHEELS = ("left_wheel", "right_wheel", "left_caster", "right_caster")
 
 
-def loads(*empty, since=0.5, until=2.0):
-    given = {wheel: np.full(TIME.size, 250.0) for wheel in WHEELS}
+SIX = (*WHEELS, "left_rear_caster", "right_rear_caster")
+
+
+def loads(*empty, since=0.5, until=2.0, wheels=WHEELS):
+    given = {wheel: np.full(TIME.size, 250.0) for wheel in wheels}
     for wheel in empty:
         given[wheel][(since <= TIME) & (until > TIME)] = 0.0
     return given
@@ -149,6 +152,22 @@ def test_which_wheels_may_be_in_the_air(empty, kind):
     assert short is None
     long = first_fall(TIME, level, loads(*empty, until=0.5 + 1.5 * UNLOADED), 1000.0)
     assert (long and long.kind) is (kind if kind is Fall.OFF_GROUND else None), "it came back"
+
+
+@pytest.mark.parametrize(
+    ("empty", "kind"),
+    [
+        (("left_wheel", "right_wheel"), None),
+        (("left_rear_caster", "right_rear_caster"), None),
+        (("left_wheel", "right_wheel", "left_rear_caster", "right_rear_caster"), Fall.TIPPED),
+        (("left_wheel", "left_caster"), None),
+        (("left_wheel", "left_caster", "left_rear_caster"), Fall.TIPPED),
+        (SIX, Fall.OFF_GROUND),
+    ],
+)
+def test_which_of_six_wheels_may_be_in_the_air(empty, kind):
+    fallen = first_fall(TIME, np.zeros(TIME.size), loads(*empty, wheels=SIX), 1000.0)
+    assert (fallen and fallen.kind) is kind
 
 
 def test_a_chair_that_lies_has_tipped_whatever_its_wheels_bear():

@@ -11,8 +11,9 @@ import mjchair
 from mjchair import tasks
 from mjchair.model.mass_distribution import mass_distribution
 from mjchair.simulation.standing import Fall, fall_of_run
-from mjchair.tasks import ramp_hold
+from mjchair.tasks import arena, ramp_hold
 from mjchair.tasks.baselines import Drive
+from mjchair.tasks.standing_watch import StandingWatch
 
 drawn = pytest.mark.skipif(not has_graphics(), reason="no offscreen OpenGL on this machine")
 
@@ -252,6 +253,20 @@ def test_an_episode_ends_by_the_rule_of_a_recording(angle, end):
     assert environment.task.fall is (Fall.TIPPED if angle > 0.785 else Fall.OFF_GROUND)
     environment.reset()
     assert environment.task.fall is None
+
+
+@pytest.mark.parametrize(("borne", "fall"), [("", Fall.OFF_GROUND), ("rear", None)])
+def test_all_six_wheels_of_a_mid_drive_chair_count(borne, fall):
+    """A chair on its two rear casters alone has not left the ground."""
+    physics = arena.physics(mjchair.load_spec("power_mid"))
+    watch = StandingWatch(physics)
+    physics.data.sensordata[:] = 0.0
+    if borne:
+        for side in ("left", "right"):
+            physics.data.sensor(f"{side}_rear_caster_tire").data[2] = 400.0
+    for physics.data.time in (0.0, 0.3, 0.6):
+        watch.update(physics)
+    assert watch.fall is fall
 
 
 def test_an_episode_and_a_recording_agree_on_a_fall():

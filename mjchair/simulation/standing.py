@@ -7,8 +7,9 @@ and when the chair stopped standing, or None. The rule:
   of the plane geom `floor`, or the vertical where there is no such plane.
 - A chair has tipped over when both rear wheels, or both wheels of one side, bear no load during
   at least the last `UNLOADED` seconds of a run, without interruption: it lies on its footrest or on
-  its side. Casters in the air do not count as tipping, since a chair may stand on its anti-tippers
-  or in a wheelie.
+  its side. With rear casters behind the driven wheels, the driven wheels and the rear casters count
+  together, since such a chair may stand on its casters alone. Casters in the air do not count as
+  tipping, since a chair may stand on its anti-tippers or in a wheelie.
 - A chair has left the ground when no wheel bears load for `UNLOADED` seconds. A chair that hops
   over a kerb is in the air for less than 0.1 s; in 0.5 s it falls 1.2 m.
 
@@ -26,7 +27,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjchair.model.wheels import base_name, wheels
+from mjchair.model.wheels import REAR_CASTERS, WHEELS, base_name, wheels
 from mjchair.simulation import names
 
 Array = NDArray[np.float64]
@@ -89,20 +90,19 @@ def groups(wheel_names: Iterable[str]) -> dict[str, list[str]]:
     Only for a chair whose wheels have the names of mjchair.model.wheels.WHEELS.
     """
     known = {base_name(name): name for name in wheel_names}
-    rear, sides = ("left_wheel", "right_wheel"), ("left", "right")
-    if not {*rear, *(f"{side}_caster" for side in sides)} <= set(known):
+    if not set(WHEELS) <= set(known):
         return {}
-    more = {s: [n for n in (f"{s}_rear_caster",) if n in known] for s in sides}
-    pairs = {
-        f"{'all' if more[s] else 'both'} wheels of its {s} side": [
-            f"{s}_wheel",
-            f"{s}_caster",
-            *more[s],
+    behind = [caster for caster in REAR_CASTERS if caster in known]
+    many = len(behind) == len(REAR_CASTERS)
+    listed = {
+        f"{'all' if many else 'both'} wheels of its {side} side": [
+            wheel for wheel in (*WHEELS, *behind) if wheel.startswith(side)
         ]
-        for s in sides
+        for side in ("left", "right")
     }
-    pairs["both rear wheels"] = list(rear)
-    return {words: [known[name] for name in pair] for words, pair in pairs.items()}
+    rear = "the driven wheels and the rear casters" if many else "both rear wheels"
+    listed[rear] = ["left_wheel", "right_wheel", *behind]
+    return {words: [known[name] for name in group] for words, group in listed.items()}
 
 
 def first_fall(
@@ -126,12 +126,12 @@ def first_fall(
         began = _lasting(time, np.logical_and.reduce(list(empty.values())))
         if began is not None:
             falls.append(Fallen(Fall.OFF_GROUND, began, f"no wheel bore load for {UNLOADED:g} s"))
-    for words, pair in groups(loads).items():
-        together = np.logical_and.reduce([empty[wheel] for wheel in pair])
+    for words, group in groups(loads).items():
+        together = np.logical_and.reduce([empty[wheel] for wheel in group])
         began = _lasting(time, together, to_the_end=True)
         if began is not None:
             falls.append(Fallen(Fall.TIPPED, began, f"{words} {in_air}"))
-    # in the air every pair of wheels is without load: leaving the ground takes precedence
+    # in the air every group of wheels is without load: leaving the ground takes precedence
     return min(falls, key=lambda f: (f.time, f.kind is Fall.TIPPED), default=None)
 
 
@@ -160,16 +160,21 @@ def fall_of_run(model: mujoco.MjModel, time: Array, qpos: Array, sensed: Array) 
     falls = []
     for joint in chair_joints(model):
         body = int(model.jnt_bodyid[joint])
-        loads = {
-            wheel.name: sensed[:, place]
-            for wheel in wheels(model)
-            if model.body_rootid[wheel.body] == body
-            and (place := _load_place(model, wheel.actuator)) is not None
-        }
+        loads = {wheel: sensed[:, at] for wheel, at in load_places(model, body).items()}
         fallen = first_fall(time, lean(model, joint, qpos, normal), loads, weights[body])
         if fallen is not None:
             falls.append(fallen)
     return min(falls, key=lambda f: f.time, default=None)
+
+
+def load_places(model: mujoco.MjModel, chair: int) -> dict[str, int]:
+    """Wheel of the chair whose body is `chair` -> index of its load in the sensor data."""
+    return {
+        wheel.name: place
+        for wheel in wheels(model)
+        if model.body_rootid[wheel.body] == chair
+        and (place := _load_place(model, wheel.actuator)) is not None
+    }
 
 
 def _load_place(model: mujoco.MjModel, actuator: int) -> int | None:

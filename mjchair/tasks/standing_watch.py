@@ -12,11 +12,16 @@ import math
 
 import numpy as np
 
-from mjchair.model.wheels import WHEELS
-from mjchair.simulation.standing import LEAST, TIPPED, UNLOADED, Fall, floor_normal, groups
+from mjchair.simulation.standing import (
+    LEAST,
+    TIPPED,
+    UNLOADED,
+    Fall,
+    floor_normal,
+    groups,
+    load_places,
+)
 from mjchair.tasks.physics import Physics
-
-FZ = 2  # index of the load in a tire sensor's reading
 
 
 class StandingWatch:
@@ -27,17 +32,15 @@ class StandingWatch:
     """
 
     def __init__(self, physics: Physics) -> None:
-        """Read floor normal, weight, and indices of the readings from the model."""
+        """Read floor normal, weight and wheels, four or six, from the model."""
         model = physics.model.ptr
         self.fall: Fall | None = None
         self._normal = floor_normal(model)
         self._chair = model.body("chair").id
         gravity = float(np.linalg.norm(model.opt.gravity))
         self._least_load = LEAST * gravity * float(model.body_subtreemass[self._chair])
-        self._load_places = {
-            wheel: int(model.sensor(f"{wheel}_tire").adr[0]) + FZ for wheel in WHEELS
-        }
-        self._pairs = list(groups(WHEELS).values())
+        self._load_places = load_places(model, self._chair)
+        self._groups = list(groups(self._load_places).values())
         self._unloaded_since: dict[str, float] = {}  # names of wheels, joined -> time, s
 
     def restart(self) -> None:
@@ -63,8 +66,8 @@ class StandingWatch:
         if self._lasts("all", all(unloaded.values()), time):
             return Fall.OFF_GROUND
         lasting = [
-            self._lasts(" ".join(pair), all(unloaded[wheel] for wheel in pair), time)
-            for pair in self._pairs
+            self._lasts(" ".join(group), all(unloaded[wheel] for wheel in group), time)
+            for group in self._groups
         ]
         return Fall.TIPPED if any(lasting) else None
 
