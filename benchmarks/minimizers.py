@@ -17,6 +17,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import mujoco.minimize
 import numpy as np
+from noisy_run import NOISE, noisy_run
 from scipy.linalg import cho_solve
 
 import mjchair
@@ -31,18 +32,9 @@ from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.replay.sampling import residual
 from mjchair.diagnosis.replay.window_states import track
 from mjchair.effects.library import find
-from mjchair.measurement.trial import Trial
 from mjchair.simulation.initial import Initial
 from mjchair.simulation.inputs import Inputs
 
-NOISE = {
-    "heading": 0.01,
-    "left_wheel_speed": 0.05,
-    "right_wheel_speed": 0.05,
-    "imu_gyro.z": 0.02,
-    "position.x": 0.02,
-    "position.y": 0.02,
-}
 # hidden effect and values -> starts of the fit
 CASES = (
     ("rolling_resistance", {"coefficient": 0.004}, ({"coefficient": 0.003}, {"coefficient": 0.03})),
@@ -70,18 +62,14 @@ def measured(name: str, values: dict[str, float]) -> list[Run]:
     find(name).apply(spec, values)
     time = np.arange(0.0, 4.0, 0.01)
     turn = Inputs(time, {"left_wheel": -3.0 + 0 * time, "right_wheel": 6.5 + 0 * time}, "turn")
-    runs = []
-    for word, start, inputs in (
-        ("east", Initial((0.0, 0.0), 0.0, 1.5), None),
-        ("west", Initial((4.0, 0.0), np.pi, 1.2), None),
-        ("turn", Initial((0.0, 0.0), 0.5, 1.0, 0.6), turn),
-    ):
-        run = mjchair.simulate(spec, inputs, 3.9, initial=start, sample_rate=50.0)
-        noisy = {c: run[c] + s * rng.standard_normal(run.time.size) for c, s in NOISE.items()}
-        runs.append(
-            Run(Trial(word, run.time, noisy, inputs, {}), word, False, Initial(), frozenset())
+    return [
+        noisy_run(rng, spec, word, start, 3.9, inputs)
+        for word, start, inputs in (
+            ("east", Initial((0.0, 0.0), 0.0, 1.5), None),
+            ("west", Initial((4.0, 0.0), np.pi, 1.2), None),
+            ("turn", Initial((0.0, 0.0), 0.5, 1.0, 0.6), turn),
         )
-    return runs
+    ]
 
 
 class Counted:

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from noisy_run import NOISE, noisy_run
 
 import mjchair
 from mjchair.diagnosis import diagnose
-from mjchair.diagnosis.data.study import Run, make_study
+from mjchair.diagnosis.data.study import make_study
 from mjchair.diagnosis.explain.candidates import Around, collect
 from mjchair.diagnosis.explain.column_ids import Driver, Quantity
 from mjchair.diagnosis.fit.nonlinear import refit
@@ -21,30 +22,19 @@ from mjchair.diagnosis.replay.window_states import track
 from mjchair.effects.effect import Effect, Parameter
 from mjchair.effects.library import find
 from mjchair.errors import MjchairError
-from mjchair.measurement.trial import Trial
 from mjchair.model import inertials
 from mjchair.simulation.initial import Initial
 
-NOISE = {
-    "heading": 0.01,
-    "left_wheel_speed": 0.05,
-    "right_wheel_speed": 0.05,
-    "imu_gyro.z": 0.02,
-    "position.x": 0.02,
-    "position.y": 0.02,
-}
 TRUTH = {"coefficient": 0.002}
 ONE_WAY = (Initial((0.0, 0.0), 0.3, 1.5), Initial((0.0, 0.5), 0.3, 1.2))
 BY_NAME = {m.name: m for m in LIBRARY}
 
 
-def measured(rng, name, start, seconds, inputs=None):
+def measured(rng, name, start, seconds):
     """A run of a chair with more rolling resistance than its model has."""
     spec = mjchair.load_spec()
     find("rolling_resistance").apply(spec, TRUTH)
-    run = mjchair.simulate(spec, inputs, seconds, initial=start, sample_rate=50.0)
-    noisy = {c: run[c] + std * rng.standard_normal(run.time.size) for c, std in NOISE.items()}
-    return Run(Trial(name, run.time, noisy, inputs, {}), name, False, Initial(), frozenset())
+    return noisy_run(rng, spec, name, start, seconds)
 
 
 def fitted(bench, found, name, free):

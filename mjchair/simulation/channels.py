@@ -1,7 +1,7 @@
 """Sensors as named scalar channels with units.
 
 In: a compiled model. Out: a `Channel` for each component of each sensor, in the order of
-`sensordata`.
+`sensordata`; the place there of a component of a tire sensor.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import mujoco
 
 from mjchair.drive import block
-from mjchair.model.wheels import base_name
+from mjchair.model.wheels import SUFFIX, base_name
 from mjchair.simulation import names
 from mjchair.simulation.inputs import is_position
 
@@ -80,10 +80,24 @@ def channels(model: mujoco.MjModel) -> list[Channel]:
     return listed
 
 
+def tire_place(model: mujoco.MjModel, wheel: str, component: str) -> int:
+    """Index in `sensordata` of a component of a wheel's tire sensor.
+
+    Args:
+      wheel: name of the wheel, as it is in the model or without a prefix. component: of `TIRE`,
+        such as "Fz".
+
+    Raises:
+      MjchairError: the wheel has no tire sensor, or the name fits several wheels.
+    """
+    sensor = names.find(wheel + SUFFIX, names.sensors(model), "sensor")
+    return int(model.sensor_adr[sensor]) + [name for name, _ in TIRE].index(component)
+
+
 def _components(model: mujoco.MjModel, i: int, name: str) -> list[tuple[str, str]]:
     kind, dim = _S(model.sensor_type[i]), int(model.sensor_dim[i])
     if kind == _S.mjSENS_USER:
-        if name.endswith("_tire") and dim == len(TIRE):
+        if name.endswith(SUFFIX) and dim == len(TIRE):
             return [("." + part, unit) for part, unit in TIRE]
         of_drive = _DRIVE.get(base_name(name), ())
         if dim == len(of_drive):

@@ -27,8 +27,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjchair.model.wheels import REAR_CASTERS, WHEELS, base_name, wheels
+from mjchair.model.wheels import REAR_CASTERS, SUFFIX, WHEELS, base_name, wheels
 from mjchair.simulation import names
+from mjchair.simulation.channels import tire_place
 
 Array = NDArray[np.float64]
 
@@ -168,22 +169,13 @@ def fall_of_run(model: mujoco.MjModel, time: Array, qpos: Array, sensed: Array) 
 
 
 def load_places(model: mujoco.MjModel, chair: int) -> dict[str, int]:
-    """Wheel of the chair whose body is `chair` -> index of its load in the sensor data."""
+    """Wheel of the chair whose body is `chair` -> index of its load in the sensor data.
+
+    A wheel without a tire sensor is left out.
+    """
+    sensors = names.sensors(model)
     return {
-        wheel.name: place
+        wheel.name: tire_place(model, wheel.name, "Fz")
         for wheel in wheels(model)
-        if model.body_rootid[wheel.body] == chair
-        and (place := _load_place(model, wheel.actuator)) is not None
+        if model.body_rootid[wheel.body] == chair and wheel.name + SUFFIX in sensors
     }
-
-
-def _load_place(model: mujoco.MjModel, actuator: int) -> int | None:
-    """Index of a wheel's load in the sensor data; None: the wheel has no tire sensor."""
-    for i in range(model.nsensor):
-        if (
-            model.sensor_type[i] == mujoco.mjtSensor.mjSENS_USER
-            and model.sensor_objtype[i] == mujoco.mjtObj.mjOBJ_ACTUATOR
-            and model.sensor_objid[i] == actuator
-        ):
-            return int(model.sensor_adr[i]) + 2
-    return None

@@ -14,7 +14,7 @@ import numpy as np
 from mjchair.engine.install import installed
 from mjchair.model.spec import compile_spec
 from mjchair.model.wheels import SUFFIX, base_name, wheels
-from mjchair.simulation import names
+from mjchair.simulation.channels import tire_place
 from mjchair.testlab.design import GRAVITY, Design
 
 RADIUS = 0.6  # m, of the drum
@@ -31,7 +31,7 @@ def drum_drag(design: Design, wheel: str, load: float, speed: float = 1.0) -> fl
     radius = float(chair.geom_size[chosen.geom, 0])
     data.joint("drum").qvel[0] = -speed / RADIUS  # its top moves to the rear, as a floor does
     data.joint(wheel).qvel[0] = speed / radius
-    at = int(model.sensor_adr[names.find(wheel + SUFFIX, names.sensors(model), "sensor")])
+    at = tire_place(model, wheel, "Fx")
     forces = []
     with installed():
         steps = round(0.01 / model.opt.timestep)

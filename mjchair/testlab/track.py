@@ -19,6 +19,7 @@ from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
 from mjchair.model.spec import compile_spec
 from mjchair.simulation import names
+from mjchair.simulation.channels import tire_place
 from mjchair.simulation.from_states import FULL, recording_of
 from mjchair.simulation.initial import Initial, start
 from mjchair.simulation.recording import Recording
@@ -116,11 +117,7 @@ class View:
         self._site = names.find(
             "axle", names.names(model, mujoco.mjtObj.mjOBJ_SITE, model.nsite), "site"
         )
-        sensors = names.sensors(model)
-        self._tires = {
-            wheel: int(model.sensor_adr[names.find(f"{wheel}_tire", sensors, "sensor")])
-            for wheel in self.parts.geoms
-        }
+        self._load_places = {w: tire_place(model, w, "Fz") for w in self.parts.geoms}
         self._dofs = {w: int(model.jnt_dofadr[j]) for w, j in self.parts.joints.items()}
         self._chair = int(model.jnt_dofadr[model.body_jntadr[self.parts.chair]])
         self._heading = 0.0
@@ -148,7 +145,7 @@ class View:
         self.yaw_rate = float(spin[2])
         self.left = float(data.qvel[self._dofs["left_wheel"]])
         self.right = float(data.qvel[self._dofs["right_wheel"]])
-        self.loads = {w: float(data.sensordata[i + 2]) for w, i in self._tires.items()}
+        self.loads = {w: float(data.sensordata[i]) for w, i in self._load_places.items()}
 
     def touching(self, geoms: Sequence[int]) -> bool:
         """Whether one of these geoms has a contact force with the world."""
