@@ -20,7 +20,7 @@ test: $(READY) graphics
 	$(RUN) -m ruff format --check .
 	$(RUN) -m ruff check .
 	$(RUN) -m mypy
-	$(RUN) -m pytest -n 2 --dist loadfile
+	$(RUN) -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 pictures: $(READY) graphics
 	$(RUN) scripts/pictures.py

@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import json
 import os
+import select
 import shutil
 import subprocess
 import tempfile
@@ -30,7 +31,7 @@ FLAGS = (
 )
 DRAWING = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 NO_DRAWING = ("--disable-gpu", "--disable-3d-apis")
-PATIENCE = 60.0  # s, for one answer on a busy machine
+PATIENCE = 120.0  # s, for one answer; so long that only a browser that hangs exceeds it
 
 
 def program() -> str | None:
@@ -79,9 +80,17 @@ class Page:
         )
         os.close(to_browser[0]), os.close(from_browser[1])
         self._write, self._read = to_browser[1], from_browser[0]
-        targets = self._ask("Target.getTargets")["targetInfos"]
-        target = next(t["targetId"] for t in targets if t["type"] == "page")
         self._session = None
+        try:
+            self._open(width, height)
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def _open(self, width: int, height: int) -> None:
+        """A page of our own: the browser's first one may not be there yet."""
+        target = self._ask("Target.createTarget", url="about:blank")["targetId"]
         attached = self._ask("Target.attachToTarget", targetId=target, flatten=True)
         self._session = attached["sessionId"]
         for domain in ("Network", "Runtime", "Log", "Page"):
@@ -94,17 +103,13 @@ class Page:
             mobile=False,
         )
         self._ask("Page.navigate", url=self._path.as_uri())
-        deadline = time.monotonic() + PATIENCE
-        while self.value("document.readyState") != "complete":
-            assert time.monotonic() < deadline, "the page does not load"
-            time.sleep(0.1)
-        return self
+        self.wait("document.readyState === 'complete'")
 
     def __exit__(self, *_: object) -> None:
         try:
             self._session = None
             self._ask("Browser.close")
-            self._process.wait(10)
+            self._process.wait(PATIENCE)
         except Exception:
             self._process.kill()
             self._process.wait()
@@ -118,6 +123,13 @@ class Page:
         )
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
+
+    def wait(self, expression: str) -> None:
+        """Return once the expression is true in the page."""
+        deadline = time.monotonic() + PATIENCE
+        while not self.value(expression):
+            assert time.monotonic() < deadline, f"never true: {expression}"
+            time.sleep(0.05)
 
     def press(self, key: str) -> None:
         """A key, down and up."""
@@ -142,7 +154,7 @@ class Page:
     def _ask(self, method: str, **given: object) -> dict:
         self._count += 1
         message = {"id": self._count, "method": method, "params": given}
-        if self._session if hasattr(self, "_session") else None:
+        if self._session:
             message["sessionId"] = self._session
         os.write(self._write, json.dumps(message).encode() + b"\0")
         while True:
@@ -154,6 +166,8 @@ class Page:
 
     def _next(self) -> dict:
         while b"\0" not in self._rest:
+            ready, _, _ = select.select([self._read], [], [], PATIENCE)
+            assert ready, "the browser does not answer"
             more = os.read(self._read, 1 << 20)
             assert more, "the browser has gone"
             self._rest += more

@@ -1,3 +1,10 @@
+import os
+from pathlib import Path
+
+# The processors are busy with tests: more threads for matrices this small only wait for each other.
+# Set before NumPy is imported; processes that tests start inherit it.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 import mujoco
 import numpy as np
 import pytest
@@ -6,6 +13,25 @@ import mjchair
 from mjchair.report import gl
 
 SLALOM_STEPS = 1500
+# files that take long, the longest first: they start first, so that both workers end together
+LONG = (
+    "test_blind.py",
+    "test_diagnose_command.py",
+    "test_wheel.py",
+    "test_experiments.py",
+    "test_diagnosis.py",
+    "test_docs.py",
+    "test_own_effect.py",
+    "test_laboratory_page.py",
+    "test_imports.py",
+    "test_noise_levels.py",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Long files come first; `make test` hands out whole files in this order."""
+    place = {name: k for k, name in enumerate(LONG)}
+    items.sort(key=lambda item: place.get(Path(item.path).name, len(LONG)))
 
 
 def has_graphics() -> bool:

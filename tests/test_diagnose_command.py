@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 
 import browser
 import mujoco
@@ -205,22 +204,32 @@ def test_bad_arguments_are_one_line_and_nothing_is_written(done, tmp_path, capsy
         assert not out.exists(), arguments
 
 
-def started(study, out, after):
-    """A diagnosis in a process of its own, once it has kept `after` simulations."""
-    command = [sys.executable, "-m", "mjchair", "diagnose", str(study), "--out", str(out)]
-    process = subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        # a shell's background job ignores Ctrl-C, and so would all that it starts
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+# a diagnosis that sends itself a signal as soon as it has kept so many simulations
+INTERRUPTED = """
+import os, signal, sys
+from mjchair import cli
+from mjchair.diagnosis.replay.cache import Store
+number, after = int(sys.argv[1]), int(sys.argv[2])
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job ignores Ctrl-C
+save, saved = Store.save, []
+
+def counted(self, key, arrays):
+    save(self, key, arrays)
+    saved.append(key)
+    if len(saved) == after:
+        os.kill(os.getpid(), number)
+
+Store.save = counted
+sys.exit(cli.main(sys.argv[3:]))
+"""
+
+
+def interrupted(study, out, number, after):
+    """A diagnosis in a process of its own, ended by a signal once it has kept `after` more."""
+    arguments = [str(int(number)), str(after), "diagnose", str(study), "--out", str(out)]
+    return subprocess.run(
+        [sys.executable, "-c", INTERRUPTED, *arguments], capture_output=True, text=True
     )
-    deadline = time.monotonic() + 300.0
-    while len(kept(out)) < after and process.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.02)
-    assert process.poll() is None, process.communicate()
-    return process
 
 
 def kept(out):
@@ -231,19 +240,17 @@ def test_an_interrupted_run_goes_on_from_what_was_kept(done, tmp_path, monkeypat
     study, whole = done
     out = tmp_path / "out"
 
-    process = started(study, out, 2)
-    process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=300)
-    assert process.returncode == 130
-    assert said.startswith("mjchair: interrupted") and said.count("\n") == 1
+    ended = interrupted(study, out, signal.SIGINT, 2)
+    assert ended.returncode == 130, ended.stderr
+    assert ended.stderr.startswith("mjchair: interrupted") and ended.stderr.count("\n") == 1
     first = kept(out)
     assert len(first) >= 2
 
-    process = started(study, out, len(first) + 3)
-    process.send_signal(signal.SIGKILL)
-    process.communicate(timeout=300)
+    ended = interrupted(study, out, signal.SIGKILL, 3)
+    assert ended.returncode == -signal.SIGKILL, ended.stderr
     second = kept(out)
     assert first.items() <= second.items()  # none was made again
+    assert len(second) == len(first) + 3
     assert {p.name for p in out.iterdir()} == {"unfinished"}
 
     loaded = set()

@@ -214,10 +214,7 @@ def test_keys_mouse_and_touch_move_the_time(page, turning):
     page.press("ArrowRight")
     assert 0.0 < page.value("mjchair.time") <= 1.0 / RATE + 1e-6
     page.press(" ")
-    page.value(
-        "new Promise((done) => {const wait = () => mjchair.time > 0.05 ? done() :"
-        "requestAnimationFrame(wait); wait()})"
-    )
+    page.wait("mjchair.time > 0.05")
     page.press(" ")
     played = page.value("mjchair.time")
     assert page.value("new Promise((d) => setTimeout(() => d(mjchair.time), 200))") == played
@@ -245,9 +242,10 @@ def test_the_pointer_over_a_diagram_tells_the_values_there(page, turning):
     at = turning.time[int(np.argmax(torque))]
     x = box[0] + 46 + at / turning.time[-1] * (box[2] - 50)
     page.mouse("mouseMoved", x, box[1] + 20)
-    page.value("new Promise((done) => setTimeout(done, 300))")
-    text = page.value("document.querySelector('.panel p').innerText")
-    assert float(re.search(r"left (\S+)", text)[1]) == pytest.approx(torque.max(), rel=0.02)
+    told = (
+        "parseFloat((document.querySelector('.panel p').innerText.match(/left (\\S+)/) || [])[1])"
+    )
+    page.wait(f"Math.abs({told} / {torque.max()} - 1.0) < 0.02")
 
 
 @browser

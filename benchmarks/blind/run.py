@@ -63,6 +63,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=100)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--numbers", type=int, nargs="+", help="cases, instead of first and count")
     parser.add_argument("--trials", type=int, default=6)
     parser.add_argument("--seconds", type=float, default=6.0)
     parser.add_argument("--workers", type=int, default=2)
@@ -73,7 +74,8 @@ def main() -> None:
     path = args.work / f"results_{args.generator}_{args.seed}.jsonl"
     done = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
     have = {line["number"] for line in done}
-    todo = [n for n in range(args.first, args.first + args.count) if n not in have]
+    numbers = args.numbers or range(args.first, args.first + args.count)
+    todo = [n for n in numbers if n not in have]
     threads = max(1, (os.cpu_count() or 1) // args.workers)
     with ProcessPoolExecutor(args.workers, get_context("spawn")) as pool:
         running = [
