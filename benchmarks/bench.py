@@ -31,7 +31,7 @@ import numpy as np
 from mujoco import batch
 
 import mjchair
-from mjchair.model.visual_geoms import without_looks
+from mjchair.model.visual_geoms import without_visual_geoms
 from mjchair.storage import write_whole
 
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -133,8 +133,8 @@ def step_time() -> list[Line]:
             "tires": stepping(full, True),
             "native": stepping(tireless(spec, 3), None),
             "bare": stepping(tireless(spec, 1), None),
-            "slim": stepping(without_looks(spec).compile(), True),
-            "apart": stepping(mjchair.load_spec(merge_looks=False).compile(), True),
+            "slim": stepping(without_visual_geoms(spec).compile(), True),
+            "apart": stepping(mjchair.load_spec(merge_visual_geoms=False).compile(), True),
         }
     )
     plain = side_by_side({"tires": stepping(full, True), "plain": stepping(full, False, 20)}, 7)
@@ -160,7 +160,7 @@ def step_time() -> list[Line]:
             f"{plain['plain'].min():.0f} us",
         ),
         Line(
-            "against the chair with its looks not merged",
+            "against the chair with its visual geoms not merged",
             f"{ratio(found, 'tires', 'apart'):.2f}",
             "<= 0.8",
             f"{us['apart']:.2f} us",
@@ -228,7 +228,7 @@ def first_step() -> list[Line]:
 
 def batches() -> list[Line]:
     """Throughput of mujoco.batch on one and two threads."""
-    model = without_looks(mjchair.load_spec()).compile()
+    model = without_visual_geoms(mjchair.load_spec()).compile()
     _, state = rolling(model)
     chairs, steps = 64, 200
 
@@ -257,7 +257,7 @@ def environments() -> list[Line]:
     from mjchair import tasks
 
     def turn(tires: bool) -> Callable[[], float]:
-        environment = tasks.load("straight_line", {"random": 0}, looks=False)
+        environment = tasks.load("straight_line", {"random": 0}, visual_geoms=False)
         action, steps = np.array([1.0, 1.2]), 60
 
         def run() -> float:
@@ -477,7 +477,7 @@ def dask(study: object, first: list) -> list[Line]:
 
 def crowd(count: int) -> mujoco.MjModel:
     """A scene of several chairs, 3 m apart."""
-    chair = without_looks(mjchair.load_spec())
+    chair = without_visual_geoms(mjchair.load_spec())
     parent = mujoco.MjSpec()
     parent.nuser_sensor, parent.visual.map.zfar = 2, chair.visual.map.zfar
     for name in ("timestep", "integrator", "cone", "tolerance"):
@@ -485,7 +485,7 @@ def crowd(count: int) -> mujoco.MjModel:
     floor = next(g for g in chair.geoms if g.name == "floor")
     parent.worldbody.add_geom(name="floor", type=floor.type, size=floor.size, condim=3)
     for k in range(count):
-        one = without_looks(mjchair.load_spec())
+        one = without_visual_geoms(mjchair.load_spec())
         one.delete(one.geom("floor"))
         frame = parent.worldbody.add_frame(pos=(3.0 * (k % 4), 3.0 * (k // 4), 0.0))
         parent.attach(one, prefix=f"chair_{k}/", frame=frame)
@@ -517,11 +517,11 @@ def crowds() -> list[Line]:
 def fields() -> list[Line]:
     """Cost of a step on a height field, with the tires' own contact and with MuJoCo's."""
     turns, contacts, alone = {}, {}, {}
-    models = {"plane": without_looks(mjchair.load_spec()).compile()}
+    models = {"plane": without_visual_geoms(mjchair.load_spec()).compile()}
     for cell in (0.2, 0.05, 0.025):
         shape = (round(5 / cell) + 1, round(10 / cell) + 1)
         spec = mjchair.load_spec(scene="hfield", heights=np.zeros(shape))
-        models[f"{100 * cell:g} cm cells"] = without_looks(spec).compile()
+        models[f"{100 * cell:g} cm cells"] = without_visual_geoms(spec).compile()
     for name, model in models.items():
         contacts[name] = rolling(model)[0].ncon
         alone[name] = rolling(model, tires=False)[0].ncon

@@ -13,7 +13,7 @@ import numpy as np
 from numba import cfunc, types
 
 import mjchair
-from mjchair.model.visual_geoms import without_looks
+from mjchair.model.visual_geoms import without_visual_geoms
 
 STAGES = {
     "kinematics": mujoco.mjtTimer.mjTIMER_POS_KINEMATICS,
@@ -42,9 +42,9 @@ def models() -> dict[str, mujoco.MjModel]:
     spec = mjchair.load_spec()
     field = mjchair.load_spec(scene="hfield")
     return {
-        "plane, with looks": spec.compile(),
-        "plane": without_looks(spec).compile(),
-        "height field, 5 cm cells": without_looks(field).compile(),
+        "plane, with visual geoms": spec.compile(),
+        "plane": without_visual_geoms(spec).compile(),
+        "height field, 5 cm cells": without_visual_geoms(field).compile(),
     }
 
 

@@ -33,7 +33,7 @@ NAMES = {False: "does not know the lateral force", True: "knows the lateral forc
 def load():
     """The environment: a cross slope, and the speed of this comparison."""
     options = {"random": 0, "speed": SPEED}
-    return tasks.load("follow_path", options, looks=False, scene_kwargs={"grade": SLOPE})
+    return tasks.load("follow_path", options, visual_geoms=False, scene_kwargs={"grade": SLOPE})
 
 
 def episode(environment, seed: int, lateral: bool):

@@ -36,9 +36,9 @@ TASK, SEED, GAMMA = "straight_line", 0, 0.98
 ENVIRONMENTS = 4  # that are stepped in turn
 
 
-def environment(seed: int, looks: bool = False) -> gymnasium.Env:
+def environment(seed: int, visual_geoms: bool = False) -> gymnasium.Env:
     """The task, ten decisions a second, with flat observations, and actions within -1 and 1."""
-    task = tasks.load(TASK, {"random": seed}, {"control_timestep": 0.1}, looks=looks)
+    task = tasks.load(TASK, {"random": seed}, {"control_timestep": 0.1}, visual_geoms=visual_geoms)
     wrapped = FlattenObservation(DmControlCompatibilityV0(task))
     return Monitor(RescaleAction(wrapped, -1.0, 1.0))
 
@@ -58,7 +58,7 @@ def mean_reward(policy, seed: int, episodes: int) -> float:
 
 def baseline_reward(seed: int, episodes: int) -> float:
     """Mean reward a step of the hand-made controller."""
-    env, rewards = tasks.load(TASK, {"random": seed}, looks=False), []
+    env, rewards = tasks.load(TASK, {"random": seed}, visual_geoms=False), []
     spec = env.action_spec()
     for _ in range(episodes):
         controller, step = tasks.baseline(TASK), env.reset()
@@ -86,7 +86,7 @@ class Curve(BaseCallback):
 
 def film(policy, path: Path, seed: int, width: int) -> None:
     """An episode of the trained policy, one picture a decision."""
-    env, height = environment(seed, looks=True), 2 * round(width * 9 / 32)
+    env, height = environment(seed, visual_geoms=True), 2 * round(width * 9 / 32)
     physics = env.unwrapped._env.physics  # Shimmy keeps the dm_control environment there
     (seen, _), over, frames = env.reset(), False, []
     while not over:

@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 
 import matplotlib
+import matplotlib.pyplot
 import pytest
 
 from mjchair import cli

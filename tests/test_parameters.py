@@ -140,18 +140,18 @@ def by_parts(spec):
 )
 def test_the_inertial_is_that_of_the_parts_where_they_are(change):
     """The manual chair's frame and occupant are nothing but their geoms."""
-    spec = mjchair.load_spec(parameters=change, merge_looks=False)
+    spec = mjchair.load_spec(parameters=change, merge_visual_geoms=False)
     chair = spec.compile().body("chair")
     told = np.r_[chair.mass, chair.ipos, np.sort(chair.inertia)]
     np.testing.assert_allclose(told, by_parts(spec), rtol=2e-4, atol=2e-5)
-    before = by_parts(mjchair.load_spec(merge_looks=False))
+    before = by_parts(mjchair.load_spec(merge_visual_geoms=False))
     assert np.abs(told - before).max() > 1e-3, "the parts did not move"
 
 
 @pytest.mark.parametrize("model", ["manual", "power"])
 def test_the_seat_stands_and_leans_as_asked(model):
     asked = {"seat_height": "52 cm", "seat_angle": "9 deg", "back_angle": "14deg"}
-    spec = mjchair.load_spec(model, parameters=asked, merge_looks=False)
+    spec = mjchair.load_spec(model, parameters=asked, merge_visual_geoms=False)
     compiled = spec.compile()
     seat, back = (_turned(compiled.geom(name).quat) for name in ("seat", "back_rest"))
     assert math.degrees(math.asin(seat[2, 0])) == pytest.approx(9.0)
@@ -159,7 +159,7 @@ def test_the_seat_stands_and_leans_as_asked(model):
     top = compiled.geom("cushion" if model == "manual" else "seat")
     front = top.pos + _turned(top.quat) @ (top.size[0], 0.0, top.size[2])
     assert front[2] == pytest.approx(0.52, abs=2e-3)
-    before = mjchair.load_spec(model, merge_looks=False)
+    before = mjchair.load_spec(model, merge_visual_geoms=False)
     hips, rest = compiled.geom("pelvis").pos, before.geom("pelvis").pos
     lowered = hips[2] - rest[2] - (0.52 - _edge(model))
     assert lowered < -0.03, "the hips sink as the seat's rear does"
@@ -221,7 +221,7 @@ def test_a_saved_chair_and_ones_own_take_parameters(tmp_path):
     # merged parts keep their masses in the file; MuJoCo writes none for a part on its own
     raised = mjchair.load_spec(file, parameters={"seat_height": 0.5}).compile()
     assert raised.body("chair").ipos[2] != heavy.compile().body("chair").ipos[2]
-    file.write_text(mjchair.load_spec(merge_looks=False).to_xml())
+    file.write_text(mjchair.load_spec(merge_visual_geoms=False).to_xml())
     with pytest.raises(mjchair.MjchairError, match="seat_height: geom 'seat' has no mass"):
         mjchair.load_spec(file, parameters={"seat_height": 0.5})
     other = assets.chairs()["manual"].read_text().replace('name="pelvis"', 'name="hips"')

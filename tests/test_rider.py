@@ -274,15 +274,15 @@ def test_a_rider_that_cannot_be(tmp_path):
         Rider(lengths={"trunk": -0.1})
     with pytest.raises(MjchairError, match=r"sex 'man'.*male"):
         Rider(sex="man")
-    light = mjchair.load_spec(merge_looks=False)
+    light = mjchair.load_spec(merge_visual_geoms=False)
     light.body("chair").mass = 60.0
     with pytest.raises(MjchairError, match=r"rider of 75 kg is heavier than .* 60 kg"):
         seat.add(light, light.compile(), Rider(), 75.0)
-    thin = mjchair.load_spec(merge_looks=False)
+    thin = mjchair.load_spec(merge_visual_geoms=False)
     thin.body("chair").inertia = (0.5, 0.5, 0.5)
     with pytest.raises(MjchairError, match="leaves no body behind"):
         seat.add(thin, thin.compile(), Rider(), 75.0)
-    empty = mjchair.load_spec(merge_looks=False)
+    empty = mjchair.load_spec(merge_visual_geoms=False)
     empty.delete(empty.geom("left_thigh"))
     with pytest.raises(MjchairError, match="no geom 'left_thigh'"):
         seat.add(empty, empty.compile(), Rider(), 75.0)

@@ -8,7 +8,7 @@ import mjchair
 from mjchair.effects import rider_motion, stroke_motion
 from mjchair.effects.library import find, library
 from mjchair.errors import MjchairError
-from mjchair.model import inertials, merged_looks, moving_share
+from mjchair.model import inertials, merged_visual_geoms, moving_share
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,7 @@ def test_the_bound_is_the_rider_in_the_chair(heavy):
     assert measured[0].parameter("mass").high == pytest.approx(95.0)
     # a chair that shows nobody: a part of its body
     bare = heavy.copy()
-    merged_looks.separate(bare)
+    merged_visual_geoms.separate(bare)
     bare.delete(bare.geom("head"))
     assert rider_motion.MEASURED.on(bare).parameter("mass").high == pytest.approx(90.0)
     spec = bare.copy()

@@ -189,7 +189,7 @@ def test_the_same_controller_drives_a_dm_control_environment(spec):
     """From the same start both ways give the same run."""
     from mjchair import tasks
 
-    environment = tasks.load("power_doorway", {"random": 0}, looks=False)
+    environment = tasks.load("power_doorway", {"random": 0}, visual_geoms=False)
     environment.reset()
     physics = environment.physics
     model, data = physics.model.ptr, physics.data.ptr

@@ -100,8 +100,8 @@ class Aside(Design):
 
     to_the_left = 1.0
 
-    def spec(self, looks=False):
-        found = super().spec(looks)
+    def spec(self, visual_geoms=False):
+        found = super().spec(visual_geoms)
         body = found.body("chair")
         body.ipos = np.add(body.ipos, (0.0, 0.02 * self.to_the_left, 0.0))
         return found

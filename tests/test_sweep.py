@@ -245,12 +245,12 @@ def killer(client, name, process):
 
 
 def test_a_slim_model_is_the_same_chair():
-    from mjchair.model.visual_geoms import without_looks
+    from mjchair.model.visual_geoms import without_visual_geoms
 
     spec = mjchair.load_spec()
     states = []
     mjchair.install()
-    for model in (spec.compile(), without_looks(spec).compile()):
+    for model in (spec.compile(), without_visual_geoms(spec).compile()):
         data = mujoco.MjData(model)
         data.ctrl[:2] = 3.0, 5.0
         mujoco.mj_step(model, data, nstep=500)

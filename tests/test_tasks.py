@@ -20,7 +20,7 @@ drawn = pytest.mark.skipif(not has_graphics(), reason="no offscreen OpenGL on th
 FLAT = "observations"  # what dm_control calls them where they are flat
 
 NAMES = tuple(tasks.TASKS)
-LIGHT = {"looks": False}
+LIGHT = {"visual_geoms": False}
 
 
 def load(name, seed=0, **options):
@@ -125,8 +125,8 @@ def test_another_seed_and_another_episode_differ(name):
 
 def test_looks_change_no_observation(name):
     runs = []
-    for looks in (True, False):
-        environment = tasks.load(name, {"random": 3}, looks=looks)
+    for visual_geoms in (True, False):
+        environment = tasks.load(name, {"random": 3}, visual_geoms=visual_geoms)
         runs.append(play(environment, random_actions(environment, 60))[-1].observation)
     for key in runs[0]:
         assert np.array_equal(runs[0][key], runs[1][key]), key
@@ -346,7 +346,7 @@ def test_the_goal_in_the_picture_is_that_of_the_task():
     def plate(physics):
         return physics.named.data.mocap_pos["goal"]
 
-    environment = load("ramp_hold", looks=True)
+    environment = load("ramp_hold", visual_geoms=True)
     environment.reset()
     for moment in (0.0, 9.5):
         environment.physics.data.time = moment
@@ -356,7 +356,7 @@ def test_the_goal_in_the_picture_is_that_of_the_task():
         to_go = (x - here) * np.hypot(1.0, ramp_hold.GRADE)
         assert to_go == pytest.approx(environment.task.to_go(environment.physics))
         assert z - x * ramp_hold.GRADE == pytest.approx(0.003)
-    environment = load("push", looks=True)
+    environment = load("push", visual_geoms=True)
     environment.reset()
     for _ in range(50):
         environment.step(np.zeros(2))
@@ -370,8 +370,8 @@ def test_pixels_on_request():
     )
     picture = environment.reset().observation["pixels"]
     assert picture.shape == (48, 64, 3) and picture.std() > 5.0
-    with pytest.raises(mjchair.MjchairError, match="need looks"):
-        tasks.load("straight_line", looks=False, pixels=True)
+    with pytest.raises(mjchair.MjchairError, match="need the visual geoms"):
+        tasks.load("straight_line", visual_geoms=False, pixels=True)
 
 
 @drawn
@@ -399,18 +399,18 @@ def test_an_unknown_task_is_named():
 
 def test_a_path_of_ones_own():
     path = [(0, 0), (1, 0), (2, 0.3), (3, 0.3), (4, 0.0)]
-    environment = tasks.load("follow_path", {"random": 0, "path": path}, looks=False)
+    environment = tasks.load("follow_path", {"random": 0, "path": path}, visual_geoms=False)
     environment.reset()
     assert environment.task.course.length == pytest.approx(4.1, abs=0.1)
     assert environment.task.course.at(1.0)[0] == pytest.approx((1.0, 0.0), abs=0.03)
     with pytest.raises(mjchair.MjchairError, match="a path has shape"):
-        tasks.load("follow_path", {"path": [(0, 0), (1, 0)]}, looks=False)
+        tasks.load("follow_path", {"path": [(0, 0), (1, 0)]}, visual_geoms=False)
 
 
 def test_a_recorded_episode_is_the_episode():
     """The same rewards and places as stepping it by hand, with every sensor of the chair."""
     steps, places, rewards = 0, [], []
-    environment, controller = load("tight_turn", looks=True), tasks.baseline("tight_turn")
+    environment, controller = load("tight_turn", visual_geoms=True), tasks.baseline("tight_turn")
     step = environment.reset()
     while not step.last():
         places.append(environment.physics.data.qpos.copy())
@@ -418,7 +418,7 @@ def test_a_recorded_episode_is_the_episode():
         rewards.append(step.reward)
         steps += 1
     places.append(environment.physics.data.qpos.copy())
-    episode = tasks.record(load("tight_turn", looks=True), tasks.baseline("tight_turn"))
+    episode = tasks.record(load("tight_turn", visual_geoms=True), tasks.baseline("tight_turn"))
     np.testing.assert_array_equal(episode.qpos, places)
     np.testing.assert_array_equal(episode["reward"][1:], rewards)
     assert episode.time.size == steps + 1

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from mjchair.errors import MjchairError
-from mjchair.model import inertials, merged_looks, seating
+from mjchair.model import inertials, merged_visual_geoms, seating
 from mjchair.model.inertials import Inertial
 from mjchair.model.wheels import base_name
 
@@ -31,7 +31,7 @@ def person(spec: mujoco.MjSpec) -> tuple[Inertial, Inertial] | None:
     None: the chair does not show its rider as the shipped ones do.
     """
     copy = spec.copy()
-    merged_looks.separate(copy)
+    merged_visual_geoms.separate(copy)
     try:
         seating.remember_masses(copy)
         geoms = seating.occupant(copy)

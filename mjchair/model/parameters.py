@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from mjchair.errors import MjchairError, nearest
-from mjchair.model import edits, inertials, merged_looks, parts, seating
+from mjchair.model import edits, inertials, merged_visual_geoms, parts, seating
 from mjchair.tire import block
 from mjchair.units import quantity
 
@@ -135,7 +135,7 @@ class ChairParameters:
           MjchairError: the specification lacks what a parameter is about.
         """
         if self.given():
-            with merged_looks.apart(spec):
+            with merged_visual_geoms.apart(spec):
                 self._edit(spec)
 
     def _edit(self, spec: mujoco.MjSpec) -> None:

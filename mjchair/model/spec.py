@@ -27,7 +27,7 @@ from mjchair.drive.attach import attach
 from mjchair.drive.files import read_drive
 from mjchair.drive.quantities import Drive
 from mjchair.errors import MjchairError, nearest
-from mjchair.model import assets, merged_looks, parts, seating
+from mjchair.model import assets, merged_visual_geoms, parts, seating
 from mjchair.model.engine_warnings import unheard
 from mjchair.model.ground import FLOOR, read_heights, set_heights, set_step
 from mjchair.model.parameters import ChairParameters
@@ -65,7 +65,7 @@ def load_spec(
     parameters: ChairParameters | Mapping[str, float | str | bool] | None = None,
     rider: str | Rider = "rigid",
     drive: str | os.PathLike[str] | Drive | None = None,
-    merge_looks: bool = True,
+    merge_visual_geoms: bool = True,
 ) -> mujoco.MjSpec:
     """A chair on its tires in a scene, ready to compile.
 
@@ -98,9 +98,9 @@ def load_spec(
         (docs/power_drive.md): a profile of the chair's own drive, such as "indoor"; the path of a
         drive's TOML, of which the profile `normal` is used; or a Drive. None: torques only, or the
         drive of the file.
-      merge_looks: True merges the display geoms into one mesh for each body and material.
+      merge_visual_geoms: True merges the display geoms into one mesh for each body and material.
         Appearance and physics stay the same, and a step takes less time
-        (mjchair.model.merged_looks). False keeps them as separate geoms with their names.
+        (mjchair.model.merged_visual_geoms). False keeps them as separate geoms with their names.
 
     Returns:
       The specification, which has been compiled once as a check.
@@ -142,10 +142,10 @@ def load_spec(
         spec.option.timestep = timestep
     set_tires(spec, tire)
     compiled = finished(spec, parameters, seated, driven)
-    if merge_looks and not merged_looks.is_merged(spec):
-        merged_looks.merge(spec, compiled)
-    elif not merge_looks:
-        merged_looks.separate(spec)
+    if merge_visual_geoms and not merged_visual_geoms.is_merged(spec):
+        merged_visual_geoms.merge(spec, compiled)
+    elif not merge_visual_geoms:
+        merged_visual_geoms.separate(spec)
     return spec
 
 
@@ -165,7 +165,7 @@ def finished(
       MjchairError: as load_spec does.
     """
     if rider is not None or (parameters is not None and parameters.given()):
-        merged_looks.separate(spec)
+        merged_visual_geoms.separate(spec)
     if parameters is not None:
         parameters.apply(spec)
     compiled = compile_spec(spec)

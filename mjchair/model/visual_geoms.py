@@ -19,13 +19,13 @@ def named_elsewhere(spec: mujoco.MjSpec) -> set[str]:
     return names | {name for several in spec.tuples for name in several.objname}
 
 
-def is_only_seen(geom: Any) -> bool:
+def is_visual(geom: Any) -> bool:
     """Whether a geom is only for display: it has no contacts and gives its body no inertia."""
     body = geom.parent
     return bool(body.explicitinertial and not geom.contype and not geom.conaffinity)
 
 
-def without_looks(spec: mujoco.MjSpec) -> mujoco.MjSpec:
+def without_visual_geoms(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     """A copy without the display geoms of bodies that have explicit inertials.
 
     The bodies of the shipped chairs have explicit inertials, so trajectories stay equal to the bit.
@@ -35,7 +35,7 @@ def without_looks(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     light = spec.copy()
     meshes = set()
     for body in light.bodies[1:]:
-        for geom in [g for g in body.geoms if is_only_seen(g)]:
+        for geom in [g for g in body.geoms if is_visual(g)]:
             meshes.add(geom.meshname)
             light.delete(geom)
     shown = {geom.meshname for geom in light.geoms}

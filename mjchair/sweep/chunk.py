@@ -23,7 +23,7 @@ from mjchair.effects import library
 from mjchair.engine.install import install
 from mjchair.errors import MjchairError
 from mjchair.model.spec import compile_spec, load_spec
-from mjchair.model.visual_geoms import without_looks
+from mjchair.model.visual_geoms import without_visual_geoms
 from mjchair.model.wheels import check, cut_damping
 from mjchair.simulation import batch, names
 from mjchair.simulation.channels import channels
@@ -83,7 +83,7 @@ def _load_options(case: Case) -> str:
 def _loaded_spec(options: str, digest: str) -> mujoco.MjSpec:
     """Specification from load_spec for options (JSON); `digest` is of the compiled model."""
     # a designer's changes need the separate parts; the simulated model has no display geoms at all
-    return load_spec(**json.loads(options), merge_looks=False)
+    return load_spec(**json.loads(options), merge_visual_geoms=False)
 
 
 @functools.lru_cache(maxsize=1024)
@@ -96,7 +96,7 @@ def compiled_model(key: ChairKey) -> mujoco.MjModel:
         parameters.apply(spec)
     for name, values in study_module.effects(case).items():
         library.find(name).apply(spec, values)
-    model = compile_spec(without_looks(spec))
+    model = compile_spec(without_visual_geoms(spec))
     cut_damping(model)
     check(model)
     return model

@@ -14,7 +14,7 @@ from dm_control.mujoco import wrapper
 from numpy.typing import NDArray
 
 from mjchair.engine.install import install
-from mjchair.model.visual_geoms import without_looks
+from mjchair.model.visual_geoms import without_visual_geoms
 from mjchair.tasks.physics import Physics
 
 CONTROL_STEP = 0.02  # s, duration of an action
@@ -25,14 +25,14 @@ GOAL_LIFT = 0.003  # m above the floor, so that the floor does not hide the plat
 Array = NDArray[np.float64]
 
 
-def physics(spec: mujoco.MjSpec, looks: bool = True) -> Physics:
+def physics(spec: mujoco.MjSpec, visual_geoms: bool = True) -> Physics:
     """The physics of a specification; installs the native callbacks of the tires.
 
     Args:
-      spec: from load_spec. looks: False leaves out the display geoms, which is faster.
+      spec: from load_spec. visual_geoms: False leaves out the display geoms, which is faster.
     """
     install()
-    model = (spec if looks else without_looks(spec)).compile()
+    model = (spec if visual_geoms else without_visual_geoms(spec)).compile()
     return Physics.from_model(wrapper.MjModel(model))  # type: ignore[no-any-return]
 
 

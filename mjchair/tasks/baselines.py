@@ -22,7 +22,7 @@ from mjchair.errors import MjchairError, nearest
 from mjchair.model.mass_distribution import mass_distribution
 from mjchair.model.rolling import rear_axle
 from mjchair.model.spec import load_drive
-from mjchair.model.visual_geoms import without_looks
+from mjchair.model.visual_geoms import without_visual_geoms
 from mjchair.tasks import (
     follow_path,
     joystick,
@@ -219,4 +219,4 @@ def baseline(name: str, model: mujoco.MjModel | None = None, **settings: Any) ->
 @functools.cache
 def _model(name: str) -> mujoco.MjModel:
     """The compiled model of a task, without what is only seen."""
-    return without_looks(suite.find(name).spec()).compile()
+    return without_visual_geoms(suite.find(name).spec()).compile()

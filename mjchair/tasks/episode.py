@@ -22,8 +22,8 @@ def record(environment: Any, controller: Controller) -> Recording:
     """One episode, from its reset to its end.
 
     Args:
-      environment: as `load` gives it, with looks. controller: from an observation to an action,
-        such as one of `baseline`.
+      environment: as `load` gives it, with visual geoms. controller: from an observation to an
+        action, such as one of `baseline`.
 
     Returns:
       A recording with one sample for each control step. The channel `reward` has the reward of the

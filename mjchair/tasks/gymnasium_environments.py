@@ -44,7 +44,8 @@ def make(
       render_mode: of Shimmy: None, "rgb_array", "depth_array", "multi_camera" or "human".
         With None, display geoms are left out, which is faster.
       render_kwargs: of dm_control's render: height and width (pixels), camera_id.
-      options: of mjchair.tasks.load: task_kwargs, environment_kwargs, scene_kwargs, pixels, looks.
+      options: of mjchair.tasks.load: task_kwargs, environment_kwargs, scene_kwargs, pixels,
+        visual_geoms.
 
     Returns:
       The environment (gymnasium.Env). `reset(seed=...)` seeds the task.
@@ -53,7 +54,7 @@ def make(
       MjchairError: Shimmy is not installed, or as mjchair.tasks.load does.
     """
     drawn = render_mode is not None or bool(options.get("pixels"))
-    environment = suite.load(name, **{"looks": drawn, **options})
+    environment = suite.load(name, **{"visual_geoms": drawn, **options})
     picture = {} if render_mode == "multi_camera" else PICTURE
     try:
         from shimmy import DmControlCompatibilityV0

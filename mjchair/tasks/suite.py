@@ -63,7 +63,7 @@ def load(
     task_kwargs: Mapping[str, Any] | None = None,
     environment_kwargs: Mapping[str, Any] | None = None,
     *,
-    looks: bool = True,
+    visual_geoms: bool = True,
     pixels: Mapping[str, Any] | bool = False,
     scene_kwargs: Mapping[str, Any] | None = None,
 ) -> dm_env.Environment:
@@ -79,18 +79,19 @@ def load(
       task_kwargs: arguments of the task: `random` is a seed or a RandomState; follow_path has also
         `path` and `speed`.
       environment_kwargs: arguments of dm_control's Environment, such as flat_observation.
-      looks: False leaves out geoms that are only seen: faster, but there is no chair to film.
+      visual_geoms: False leaves out geoms that are only for display: faster, but there is no chair
+        to film.
       pixels: True, or render_kwargs such as {"height": 84, "width": 84, "camera_id": "follow"}:
         pictures are observed as well, as "pixels".
       scene_kwargs: options of load_spec (scene, grade, tilt, tire, ...), for follow_path.
 
     Raises:
-      MjchairError: an unknown name, or pixels with looks=False.
+      MjchairError: an unknown name, or pixels with visual_geoms=False.
     """
     entry = find(name)
-    if pixels and not looks:
-        raise MjchairError("pixels need looks; remove looks=False")
-    physics = arena.physics(entry.spec(**dict(scene_kwargs or {})), looks)
+    if pixels and not visual_geoms:
+        raise MjchairError("pixels need the visual geoms; remove visual_geoms=False")
+    physics = arena.physics(entry.spec(**dict(scene_kwargs or {})), visual_geoms)
     options = {
         "time_limit": entry.time_limit,
         "control_timestep": arena.CONTROL_STEP,

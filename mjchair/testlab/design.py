@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from mjchair.errors import MjchairError
 from mjchair.model.parameters import ChairParameters
 from mjchair.model.spec import compile_spec, load_spec
-from mjchair.model.visual_geoms import without_looks
+from mjchair.model.visual_geoms import without_visual_geoms
 from mjchair.model.wheels import base_name, wheels
 from mjchair.tire import block
 
@@ -94,17 +94,23 @@ class Design:
             given["occupant_mass"] = self.occupant
         return ChairParameters.of(given)
 
-    def spec(self, looks: bool = False) -> mujoco.MjSpec:
+    def spec(self, visual_geoms: bool = False) -> mujoco.MjSpec:
         """The chair on a level floor, as a copy that may be edited.
 
         Args:
-          looks: keep the geoms that are only for display.
+          visual_geoms: keep the geoms that are only for display.
 
         Raises:
           MjchairError: as load_spec does; or the chair does not have two rear wheels and two
             casters.
         """
-        key = (self.model, self.occupant, tuple(sorted(self.parameters.items())), self.draw, looks)
+        key = (
+            self.model,
+            self.occupant,
+            tuple(sorted(self.parameters.items())),
+            self.draw,
+            visual_geoms,
+        )
         return _spec(*key).copy()
 
 
@@ -114,10 +120,10 @@ def _spec(
     occupant: float | None,
     parameters: tuple[tuple[str, Any], ...],
     draw: Draw | None,
-    looks: bool,
+    visual_geoms: bool,
 ) -> mujoco.MjSpec:
     chosen = Design(model, occupant, dict(parameters)).chair_parameters()
-    spec = load_spec(model, "flat", parameters=chosen, merge_looks=False)
+    spec = load_spec(model, "flat", parameters=chosen, merge_visual_geoms=False)
     if draw is not None:
         _apply(spec, draw)
     compiled = compile_spec(spec)
@@ -128,7 +134,7 @@ def _spec(
             f"{model} has no {' and no '.join(absent)}; the tests need a chair with joints "
             f"{', '.join((*REAR, *CASTERS))}"
         )
-    return spec if looks else without_looks(spec)
+    return spec if visual_geoms else without_visual_geoms(spec)
 
 
 def _apply(spec: mujoco.MjSpec, draw: Draw) -> None:

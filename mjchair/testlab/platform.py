@@ -272,7 +272,7 @@ class Platform:
             if tilted.angle is not None and self.setup.anti_tippers and rearward:
                 tilted.held = self._over_anti_tippers(tilted, rate, trace)
         if trace is not None:
-            tilted.run = trace.run(self.design.spec(looks=True))
+            tilted.run = trace.run(self.design.spec(visual_geoms=True))
         return tilted
 
     def _until_light(

@@ -265,11 +265,11 @@ class Track:
                     return True
         return False
 
-    def run(self, looks: bool = True) -> Run:
-        """The run so far; with `looks`, its recording can be filmed."""
+    def run(self, visual_geoms: bool = True) -> Run:
+        """The run so far; with `visual_geoms`, its recording can be filmed."""
         spec = None
-        if looks:
-            spec = self.design.spec(looks=True)
+        if visual_geoms:
+            spec = self.design.spec(visual_geoms=True)
             if self._edit is not None:
                 self._edit(spec)
         return self._trace.run(spec)

@@ -90,7 +90,7 @@ def _about_the_left_wheel(pilot: Pilot, view: View) -> Torques:
 
 def _outline(design: Design) -> tuple[Array, dict[str, float]]:
     """Convex outline (n, 2) from above, m, chair frame from the axle; and sizes, m."""
-    model = compile_spec(design.spec(looks=True))
+    model = compile_spec(design.spec(visual_geoms=True))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     named = parts(model)

@@ -24,7 +24,7 @@ from mjchair.diagnosis.replay.sampling import places, sampled
 from mjchair.diagnosis.replay.state_transfer import StateCarrier
 from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
-from mjchair.model.visual_geoms import without_looks
+from mjchair.model.visual_geoms import without_visual_geoms
 from mjchair.model.wheels import COMFORTABLE, check_timestep, cut_damping
 from mjchair.simulation import batch, names
 
@@ -76,7 +76,7 @@ class WindowSimulator:
         self.threads = threads
         self.study = study
         self.channels = study.channels
-        self.spec = without_looks(study.spec)
+        self.spec = without_visual_geoms(study.spec)
         self.base = self.spec.copy().compile()
         self.chair = Chair(self.base)
         self.step = float(self.base.opt.timestep)

@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjchair.model.visual_geoms import is_only_seen, named_elsewhere
+from mjchair.model.visual_geoms import is_visual, named_elsewhere
 
 Array = NDArray[np.float64]
 Mesh = tuple[Array, NDArray[np.int64]]  # vertices (n, 3) m, and triangles (m, 3) of them
@@ -82,7 +82,7 @@ def merge(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
     geoms, kept = list(spec.geoms), named_elsewhere(spec)
     for body in spec.bodies[1:]:
         for geom in body.geoms:
-            if is_only_seen(geom) and geom.name not in kept and _can_merge(spec, geom):
+            if is_visual(geom) and geom.name not in kept and _can_merge(spec, geom):
                 look = (body.name, geom.material, tuple(geom.rgba), geom.group)
                 groups.setdefault(look, []).append(geom.id)
     names = {geom.name for geom in geoms} | {mesh.name for mesh in spec.meshes}

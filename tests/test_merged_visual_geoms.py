@@ -1,4 +1,4 @@
-"""What is only seen is merged: fewer geoms, the same physics and looks, and still to be edited."""
+"""Visual geoms are merged: fewer geoms, the same physics and appearance, and still to be edited."""
 
 import mujoco
 import numpy as np
@@ -8,8 +8,8 @@ from dm_control import mjcf
 
 import mjchair
 from mjchair import ChairParameters
-from mjchair.model import merged_looks
-from mjchair.model.visual_geoms import is_only_seen, without_looks
+from mjchair.model import merged_visual_geoms
+from mjchair.model.visual_geoms import is_visual, without_visual_geoms
 from mjchair.report import gl
 
 CHANGES = {"seat_height": 0.52, "back_angle": 0.2, "wheel_radius": 0.28, "occupant_mass": 90.0}
@@ -18,7 +18,9 @@ CHANGES = {"seat_height": 0.52, "back_angle": 0.2, "wheel_radius": 0.28, "occupa
 @pytest.fixture(scope="module", params=["manual", "power"])
 def pair(request):
     """A chair's specification as it comes, and with its parts one by one."""
-    return mjchair.load_spec(request.param), mjchair.load_spec(request.param, merge_looks=False)
+    return mjchair.load_spec(request.param), mjchair.load_spec(
+        request.param, merge_visual_geoms=False
+    )
 
 
 def _shapes(spec):
@@ -26,7 +28,7 @@ def _shapes(spec):
     return {
         g.name: (int(g.type), g.material, *g.pos, *g.quat, *g.size, max(float(g.mass), 0.0))
         for g in spec.geoms
-        if g.parent.name != "world" and is_only_seen(g) and not g.meshname
+        if g.parent.name != "world" and is_visual(g) and not g.meshname
     }
 
 
@@ -37,10 +39,10 @@ def _inertials(spec):
 
 def test_a_body_has_one_mesh_for_each_material_and_both_wheels_the_same(pair):
     merged, parts = pair
-    seen = [g for g in merged.geoms if g.parent.name != "world" and is_only_seen(g)]
-    looks = [(g.parent.name, g.material) for g in seen if not g.name.endswith("_pushrim")]
-    assert len(looks) == len(set(looks))
-    before = [g for g in parts.geoms if g.parent.name != "world" and is_only_seen(g)]
+    seen = [g for g in merged.geoms if g.parent.name != "world" and is_visual(g)]
+    seen_parts = [(g.parent.name, g.material) for g in seen if not g.name.endswith("_pushrim")]
+    assert len(seen_parts) == len(set(seen_parts))
+    before = [g for g in parts.geoms if g.parent.name != "world" and is_visual(g)]
     assert {(g.parent.name, g.material) for g in seen} == {
         (g.parent.name, g.material) for g in before
     }
@@ -51,7 +53,7 @@ def test_a_body_has_one_mesh_for_each_material_and_both_wheels_the_same(pair):
 def test_every_number_that_moves_is_the_same(pair):
     states = []
     with mjchair.installed():
-        for model in (spec.compile() for spec in (*pair, without_looks(pair[0]))):
+        for model in (spec.compile() for spec in (*pair, without_visual_geoms(pair[0]))):
             data = mujoco.MjData(model)
             data.ctrl[:2] = 3.0, 5.0
             mujoco.mj_step(model, data, nstep=400)
@@ -62,8 +64,8 @@ def test_every_number_that_moves_is_the_same(pair):
 def test_the_parts_come_back_as_they_were(pair):
     merged, parts = pair
     again = mujoco.MjSpec.from_string(merged.to_xml())  # out of a file
-    merged_looks.separate(again)
-    assert not merged_looks.is_merged(again) and len(again.geoms) == len(parts.geoms)
+    merged_visual_geoms.separate(again)
+    assert not merged_visual_geoms.is_merged(again) and len(again.geoms) == len(parts.geoms)
     there, want = _shapes(again), _shapes(mujoco.MjSpec.from_string(parts.to_xml()))
     assert there.keys() == want.keys()
     masses = {g.name: g.mass for g in parts.geoms}
@@ -127,7 +129,7 @@ def test_a_change_after_loading_makes_the_chair_that_a_change_while_loading_make
     asked = mjchair.load_spec(name, parameters=changes)
     later = mjchair.load_spec(name)
     ChairParameters(**changes).apply(later)
-    assert merged_looks.is_merged(later)
+    assert merged_visual_geoms.is_merged(later)
     np.testing.assert_allclose(_inertials(asked), _inertials(later), rtol=1e-9, atol=1e-12)
     a, b = asked.compile(), later.compile()
     assert [a.geom(i).name for i in range(a.ngeom)] == [b.geom(i).name for i in range(b.ngeom)]
@@ -144,7 +146,7 @@ def test_two_chairs_in_one_scene_can_be_taken_apart():
         chair.delete(chair.geom("floor"))
         scene.attach(chair, frame=scene.worldbody.add_frame(pos=(0, 2 * k, 0)), prefix=f"c{k}/")
     scene.compile()
-    merged_looks.separate(scene)
+    merged_visual_geoms.separate(scene)
     for k in range(2):
         assert scene.geom(f"c{k}/left_thigh").parent.name == f"c{k}/chair"
     scene.compile()
@@ -153,12 +155,12 @@ def test_two_chairs_in_one_scene_can_be_taken_apart():
 def test_pymjcf_reads_the_saved_chair():
     saved = mjchair.load_spec().to_xml()
     root = mjcf.from_xml_string(saved)
-    assert root.find("text", merged_looks.RECORD) is not None
+    assert root.find("text", merged_visual_geoms.RECORD) is not None
     assert len(root.find_all("geom")) == mjchair.load_spec().compile().ngeom
 
 
 def test_what_is_named_or_touches_or_weighs_stays_a_geom(tmp_path):
-    text = mjchair.load_spec(merge_looks=False).to_xml()
+    text = mjchair.load_spec(merge_visual_geoms=False).to_xml()
     text = text.replace(
         "<sensor>", '<sensor><framepos name="knee" objtype="geom" objname="left_shank"/>'
     )
@@ -172,7 +174,7 @@ def test_what_is_named_or_touches_or_weighs_stays_a_geom(tmp_path):
 def test_a_part_that_is_deleted_does_not_come_back():
     spec = mjchair.load_spec()
     spec.delete(spec.geom("chair_manual_hair"))
-    merged_looks.separate(spec)
+    merged_visual_geoms.separate(spec)
     assert spec.geom("hair") is None and spec.geom("head") is not None
 
 
@@ -199,7 +201,7 @@ def _picture(model):
 
 @pytest.mark.skipif(not has_graphics(), reason="no offscreen OpenGL")
 def test_a_picture_is_the_same(pair):
-    merged, parts, bare = (_picture(s.compile()) for s in (*pair, without_looks(pair[0])))
+    merged, parts, bare = (_picture(s.compile()) for s in (*pair, without_visual_geoms(pair[0])))
     apart = np.abs(merged - parts).max(axis=2)
     shown = np.abs(merged - bare).max(axis=2) > 8  # where the chair is
     assert shown.mean() > 0.02
