@@ -5,12 +5,13 @@
 A chair drives on a slope of 10 % with its joystick: up and down at full speed, across, in a
 slalom and on the spot. One chair has a weak motor, one a low battery, one a dragging brake; the
 study says that it has none of them. Each is written as a study folder and diagnosed as
-`mjchair diagnose` does.
+`mjchair diagnose` does; a line of a table says what was hidden and what was found.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from mjchair.effects.library import find
 from mjchair.storage import write_whole
 
 FAULTS = {
-    "weak_motor": {"left": 0.3, "right": 0.0},
+    "weak_motor": {"left": 0.12, "right": 0.0},
     "low_battery": {"used": 0.85},
     "dragging_brake": {"left": 0.0, "right": 8.0},
 }
@@ -77,11 +78,30 @@ def write_study(folder, fault, values, seed=0):
     write_whole(folder / "study.toml", tomli_w.dumps(study))
 
 
+def line_of(folder, fault, values):
+    """What was hidden and what was found, as a line of a table."""
+    found = json.loads((folder / "diagnosis" / "diagnosis.json").read_text())
+    effects = [
+        f"{effect['name']}: "
+        + ", ".join(
+            f"{name} {number['value']:.3f} +- {number['std'] or 0.0:.3f} {number['unit']}"
+            for name, number in effect["parameters"].items()
+        )
+        for effect in found["effects"]
+    ]
+    hidden = ", ".join(f"{name} {value:g}" for name, value in values.items())
+    gap = found["gap"]
+    left = "" if gap["after"] is None else f" to {gap['after']:.2f}"
+    told = "; ".join(effects) or "-"
+    return f"| {fault}: {hidden} | {found['verdict']} | {told} | {gap['before']:.2f}{left} |"
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", default="out/power_studies", help="default: %(default)s")
     parser.add_argument("--only", choices=FAULTS, help="one of the three")
     args = parser.parse_args()
+    lines = []
     for fault in [args.only] if args.only else FAULTS:
         folder = Path(args.out) / fault
         write_study(folder, fault, FAULTS[fault])
@@ -89,6 +109,8 @@ def main() -> int:
         code = cli.main(["diagnose", str(folder), "--out", str(folder / "diagnosis"), "--force"])
         if code:
             return code
+        lines.append(line_of(folder, fault, FAULTS[fault]))
+    print("\n".join(lines))
     return 0
 
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import mjchair
-from mjchair.drive.files import profiles
-from mjchair.model import assets
 from mjchair.simulation.energy import energy_balance
+from mjchair.testlab import Design
+from mjchair.testlab.brakes import stopping_distance
+from mjchair.testlab.energy import energy
 
 CHAIRS = ("power", "power_mid", "power_front")
-FILE = assets.chairs()["power"].parent / "drive.toml"
 GRAVITY = 9.81
 
 
@@ -83,62 +83,14 @@ def test_torques_of_others_are_in_the_balance():
     assert abs(balance.missing) < 0.005 * balance.battery
 
 
-def distance(profile, end, dial=1.0, slope=0.0):
-    """Stopping distance (m) from full speed down a slope (rad)."""
-    drive = mjchair.load_drive("power", profile)
-    drive = replace(drive, controller=replace(drive.controller, dial=dial))
-    top = drive.profile.at(dial)["forward_speed"]
-    scene = {"scene": "ramp", "grade": -math.tan(slope)} if slope else {}
-    run = mjchair.simulate(
-        mjchair.load_spec("power", drive=drive, **scene),
-        held([0.0, 1.0, 4.0], [1.0, end, end]),
-        4.0,
-        initial={"speed": 0.97 * top},
-    )
-    moved = np.hypot(*(run[f"position.{a}"] - run[f"position.{a}"][500] for a in "xz"))[500:]
-    stop = np.flatnonzero(run["velocity.x"][500:] < 1e-3)[0]
-    return moved[stop]
-
-
-def test_braking_distances_bracket_what_was_published():
-    """7 to 117 cm: Pearlman 2005, power chairs, level and sloping ground."""
-    level = [distance(p, end) for p in profiles(FILE) for end in (0.0, -1.0)]
-    assert 0.07 < min(level) < 0.117 and 0.9 < max(level) < 1.17
-    assert distance("training", -1.0, dial=0.0) < 0.07
-    assert distance("normal", 0.0, slope=math.radians(6.0)) > 1.17
-
-
-def laps(profile, stops):
-    """Energy (J/m) of a lap each way: straights of 5 m, half turns of 1 m radius or on the spot."""
-    drive = mjchair.load_drive("power", profile)
-    at = drive.profile.at(1.0)
-    top, most = at["forward_speed"], at["turn_speed"]
-    times, sticks = [0.0], []
-    for side in (1.0, -1.0):
-        for _ in range(2):
-            times.append(times[-1] + 5.0 / top)
-            sticks.append((1.0, 0.0))
-            if stops:
-                turn = min(1.0, most)
-                times += [times[-1] + 1.5, times[-1] + 1.5 + math.pi / turn]
-                sticks += [(0.0, 0.0), drive.joystick(0.0, side * turn)]
-            else:
-                speed = min(top, math.sqrt(2.0))  # 2 m/s^2 aside at most
-                turn = min(speed, most)
-                times.append(times[-1] + math.pi / turn)
-                sticks.append(drive.joystick(speed, side * turn))
-    x, y = np.array([*sticks, sticks[-1]]).T
-    run = mjchair.simulate(mjchair.load_spec("power", drive=drive), held(times, x, y))
-    way = np.hypot(np.diff(run["position.x"]), np.diff(run["position.y"])).sum()
-    return run["drive.battery_power"].sum() * run.timestep / way
-
-
-def test_ranges_bracket_what_was_published():
-    """18 to 32 km: Pearlman 2005; here with 80 % of 24 V, 50 A h."""
-    energy = 0.8 * 24.0 * 50.0 * 3.6  # J/m that empty it over a km
-    assert energy / laps("normal", stops=True) < 18.0
-    assert 18.0 < energy / laps("normal", stops=False) < 32.0
-    assert energy / laps("indoor", stops=False) > 32.0
+def test_published_ranges_are_bracketed_by_the_shipped_profiles():
+    """Braking 7.4 to 117.3 cm, range 18.2 to 32.0 km: Pearlman 2005; a dummy of 100 kg."""
+    normal, gentle = (Design("power", 100.0, drive=p) for p in ("normal", "training"))
+    assert stopping_distance(gentle, "power_off", 0.0) < 0.074  # m
+    level, down = (stopping_distance(normal, "release", math.radians(s)) for s in (0.0, 3.0))
+    assert 0.9 < level < 1.173 < down
+    assert energy(normal)["range_manoeuvring"] < 18.2  # km
+    assert energy(gentle)["range_continuous"] > 32.0
 
 
 # where it goes

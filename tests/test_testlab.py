@@ -8,18 +8,20 @@ import numpy as np
 import pytest
 
 from mjchair import cli
+from mjchair.errors import MjchairError
 from mjchair.testlab import classes, sheet
 from mjchair.testlab.brakes import brakes
 from mjchair.testlab.caster_shimmy import _onset, _ratio
 from mjchair.testlab.design import GRAVITY, Design, parts
 from mjchair.testlab.downhill_bump import attempt as bump
-from mjchair.testlab.drive import Motors, Person, drive_of
+from mjchair.testlab.drive import Joystick, Person, drive_of
 from mjchair.testlab.drum import drum_drag
 from mjchair.testlab.dummies import MASSES, dummies
 from mjchair.testlab.dynamic_stability import MANOEUVRES, score_of
 from mjchair.testlab.energy import CARPET, carpet, energy
 from mjchair.testlab.laboratory import Request, _plain
 from mjchair.testlab.obstacles import attempt as climb
+from mjchair.testlab.platform import Platform, Setup
 from mjchair.testlab.result import Result, Value
 from mjchair.testlab.rolling import START, coast_down, component_sum, treadmill
 from mjchair.testlab.speed import speed
@@ -93,10 +95,36 @@ def test_sizes_are_the_models_and_a_turn_sweeps_the_farthest_corner():
 def test_speed_is_for_motors_and_reaches_what_is_commanded():
     assert "no motor" in speed(MANUAL).missing
     assert isinstance(drive_of(MANUAL), Person)
-    assert isinstance(drive_of(POWER), Motors)
+    drive = drive_of(POWER)
+    assert isinstance(drive, Joystick) and drive.top_speed == 2.0
     result = speed(POWER)
-    assert result["top_speed_forward"] == pytest.approx(Motors().top_speed, rel=0.02)
-    assert result["top_speed_backward"] == pytest.approx(result["top_speed_forward"], rel=0.01)
+    # what the motors lose under the rolling resistance and is not compensated
+    assert 0.95 < result["top_speed_forward"] / drive.top_speed < 1.0
+    assert 0.95 < result["top_speed_backward"] / drive.reverse_speed < 1.0
+
+
+def test_a_power_chair_is_tested_with_its_own_drive():
+    """Release, reverse and power off against the profile; the range against the energy per way."""
+    told = brakes(Design("power_front", 100.0, drive="indoor"), slopes=(0.0,))
+    profile = Design("power_front", drive="indoor").own_drive().profile.at(1.0)
+    ramp = profile["forward_speed"] ** 2 / (2.0 * profile["forward_deceleration"])
+    assert 1.0 < told["stopping_release_0_deg"] / (1000.0 * ramp) < 1.5  # and the stick's filter
+    ways = [told[f"stopping_{way}_0_deg"] for way in ("release", "reverse", "power_off")]
+    assert ways == sorted(ways, reverse=True)
+    # 60 N m a brake bear 1:2.6 of the chair; its tires do not hold that
+    assert 10.0 < told["parking_uphill"] < 25.0
+
+
+def test_a_power_chair_without_a_drive_is_refused_in_one_line(tmp_path):
+    path = tmp_path / "mine.xml"
+    path.write_text(Design("power").spec().to_xml())
+    with pytest.raises(MjchairError, match=r"it has no drive: put a drive\.toml beside its file"):
+        speed(Design(str(path)))
+
+
+def test_the_platform_takes_four_wheels():
+    with pytest.raises(MjchairError, match="power_mid has 6 wheels"):
+        Platform(Design("power_mid"), Setup("rearward", False))
 
 
 def test_a_low_kerb_is_climbed_and_a_high_one_is_not():

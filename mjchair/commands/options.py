@@ -61,16 +61,21 @@ def add_model(parser: argparse.ArgumentParser) -> None:
         default="rigid",
         help="rigid (default), or moving: trunk, head and arms on joints that inputs drive",
     )
+    add_drive(parser)
+    add_parameters(parser)
+
+
+def add_drive(parser: argparse.ArgumentParser) -> None:
+    """Which drive a power chair has: `--profile NAME` and `--drive FILE`."""
     parser.add_argument(
         "--profile",
         metavar="NAME",
         help="of a power chair's controller, as indoor or normal: the chair has its drive then, "
-        "and takes joystick_x and joystick_y",
+        "and takes joystick_x and joystick_y; tests take normal by themselves",
     )
     parser.add_argument(
         "--drive", metavar="FILE", help="a drive's TOML in place of the chair's own"
     )
-    add_parameters(parser)
 
 
 def add_parameters(parser: argparse.ArgumentParser) -> None:

@@ -37,6 +37,7 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
         metavar="KG",
         help="mass of the dummy; default: the model's",
     )
+    options.add_drive(parser)
     parser.add_argument(
         "--set",
         action="append",
@@ -113,13 +114,13 @@ def _designs(args: argparse.Namespace) -> dict[str, Design]:
     combinations = list(itertools.product(*given.values()))
     if len(combinations) > DESIGNS:
         raise MjchairError(f"--set makes {len(combinations)} designs; at most {DESIGNS} at a time")
-    designs = {}
+    designs, drive = {}, options.drive(args)
     for values in combinations:
         parameters = dict(zip(given, values, strict=True))
         name = ", ".join(f"{k} {v}" for k, v in parameters.items()) or "the chair as it is"
-        designs[name] = Design(args.model, args.occupant, parameters)
+        designs[name] = Design(args.model, args.occupant, parameters, drive=drive)
     if given and len(combinations) == 1:
-        designs["the chair as it is"] = Design(args.model, args.occupant)
+        designs["the chair as it is"] = Design(args.model, args.occupant, drive=drive)
     return designs
 
 

@@ -6,22 +6,25 @@ ground and down slopes of 3, 6 and 10 deg. A chair stops in three ways: the joys
 is reversed, or the power is switched off.
 
 The quantities and the three ways to stop follow the standard. Assumptions: the slope is tilted
-slowly under the standing chair; a parking brake locks its wheel and does not slip on it; a distance
-is counted from the command to stop until the chair is at rest; the numbers of the drive.
+slowly under the standing chair; a parking brake locks its wheel and does not slip on it, but that
+of a drive slips at the torque of its drive.toml; a distance is counted from the command to stop
+until the chair is at rest; the numbers of the drive.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
 from mjchair.engine.install import installed
+from mjchair.model.wheels import REAR_CASTERS
 from mjchair.testlab.design import CASTERS, GRAVITY, REAR, Design, parts
-from mjchair.testlab.drive import Motors, Pilot, drive_of
+from mjchair.testlab.drive import STILL, Joystick, drive_of, pilot_of, switch_off
 from mjchair.testlab.result import Grid, Result, Value
-from mjchair.testlab.track import Run, Torques, Track, View
+from mjchair.testlab.track import Run, Track
 
 NAME = "brakes"
 RATE = math.radians(1.0)  # rad/s
@@ -32,8 +35,13 @@ SLOPES = (0.0, 3.0, 6.0, 10.0)  # deg
 WAYS = ("release", "reverse", "power_off")
 
 
-def brakes(design: Design, *, timestep: float | None = None) -> Result:
+def brakes(
+    design: Design, *, timestep: float | None = None, slopes: Sequence[float] = SLOPES
+) -> Result:
     """Parking brakes, and stopping distances of a chair with motors.
+
+    Args:
+      timestep: s. slopes: down which it stops, deg.
 
     Returns:
       `parking_uphill`, `parking_downhill` (deg; facing uphill or downhill) and
@@ -43,7 +51,8 @@ def brakes(design: Design, *, timestep: float | None = None) -> Result:
     curves: dict[str, tuple[list[float], list[float]]] = {}
     notes, runs = [], {}
     model = design.spec().compile()
-    if parts(model).brakes:
+    drive = drive_of(design)
+    if parts(model).brakes or isinstance(drive, Joystick):
         for name, sign in (("uphill", 1.0), ("downhill", -1.0)):
             angle, why, curve, run = _parking(design, sign, timestep)
             note = f"then it {why}" if why else f"up to the {math.degrees(STEEPEST):g} deg tried"
@@ -54,12 +63,13 @@ def brakes(design: Design, *, timestep: float | None = None) -> Result:
         for name in ("uphill", "downhill"):
             values[f"parking_{name}"] = Value(None, "deg", note="the chair has no parking brake")
     rows: list[tuple[float | str | None, ...]] = []
-    drive = drive_of(design)
-    if isinstance(drive, Motors):
-        for slope in SLOPES:
+    setup = ["tires of the model on a dry hard floor", "anti-tippers as the model has them"]
+    if isinstance(drive, Joystick):
+        setup.append(drive.describe())
+        for slope in slopes:
             row: list[float | str | None] = [f"{slope:g} deg down"]
             for way in WAYS:
-                distance = _stopping(design, drive, way, math.radians(slope), timestep)
+                distance = stopping_distance(design, way, math.radians(slope), timestep)
                 note = "" if distance is not None else "does not stop within 10 m"
                 value = None if distance is None else 1000.0 * distance
                 values[f"stopping_{way}_{slope:g}_deg"] = Value(value, "mm", note=note)
@@ -76,7 +86,7 @@ def brakes(design: Design, *, timestep: float | None = None) -> Result:
     return Result(
         NAME,
         values,
-        setup=["tires of the model on a dry hard floor", "anti-tippers as the model has them"],
+        setup=setup,
         grids=grids if rows else [],
         notes=notes,
         curves=curves,
@@ -89,10 +99,14 @@ def _parking(
     design: Design, sign: float, timestep: float | None
 ) -> tuple[float, str, tuple[list[float], list[float]], Run]:
     """The slope (rad) up to which the locked chair stays in place, and what it does beyond it."""
-    track = Track(design, brakes=True, timestep=timestep)
+    powered = design.own_drive() is not None
+    track = Track(design, brakes=not powered, timestep=timestep, driven=powered)
     model, data, view = track.model, track.data, track.view
-    begin, light = (view.x, view.y), 0.0
-    uphill = CASTERS if sign > 0.0 else REAR
+    begin, level, light = (view.x, view.y), view.pitch, 0.0
+    radius = float(model.geom_size[view.parts.geoms["left_wheel"], 0])
+    behind = tuple(wheel for wheel in REAR_CASTERS if wheel in view.loads) or REAR
+    downhill = behind if sign > 0.0 else CASTERS
+    uphill = [wheel for wheel in view.loads if wheel not in downhill]
     steps = max(1, round(0.01 / model.opt.timestep))
     angle, why = 0.0, ""
     tilts, moved = [], []
@@ -105,7 +119,9 @@ def _parking(
             track._trace.add(data)
             mujoco.mj_step(model, data, nstep=steps)
             view.update()
-            distance = math.dist((view.x, view.y), begin)
+            # a frame that pitches on its springs rolls the braked wheels along
+            rolled = radius * abs(view.pitch - level)
+            distance = max(0.0, math.dist((view.x, view.y), begin) - rolled)
             tilts.append(math.degrees(angle))
             moved.append(1000.0 * distance)
             light = light + 0.01 if sum(view.loads[w] for w in uphill) < 1.0 else 0.0
@@ -115,29 +131,25 @@ def _parking(
     return angle, why, (tilts[::10], moved[::10]), track.run()
 
 
-def _stopping(
-    design: Design, drive: Motors, way: str, slope: float, timestep: float | None
+def stopping_distance(
+    design: Design, way: str, slope: float, timestep: float | None = None
 ) -> float | None:
-    """Distance (m) from full speed down a slope to rest; None: it does not stop."""
-    track = Track(design, slope=-slope, speed=drive.top_speed, timestep=timestep)
-    pilot = Pilot(drive, track.view)
-    track.drive(lambda view: pilot.go(view, drive.top_speed), 1.0)
+    """Distance (m) from full speed down a slope (rad) to rest; None: it does not stop.
+
+    Args:
+      way: one of WAYS.
+    """
+    drive = drive_of(design)
+    track = Track(design, slope=-slope, speed=drive.top_speed, timestep=timestep, driven=True)
+    pilot = pilot_of(drive, track)
+    track.drive(lambda view: pilot.ask(view, drive.top_speed), 1.0)
     begin = (track.view.x, track.view.y)
-
     if way == "power_off":
-        dofs = [track.model.jnt_dofadr[track.view.parts.joints[wheel]] for wheel in REAR]
-        track.model.dof_frictionloss[dofs] = drive.brake
-
-    def brake(view: View) -> Torques:
-        if way == "power_off":
-            return 0.0, 0.0
-        rate = drive.reverse if way == "reverse" else drive.retardation
-        return pilot.go(view, 0.0, rate=rate)
-
+        switch_off(track.model, track.data)
     stopped = track.drive(
-        brake,
+        lambda view: pilot.stop(view, reverse=way == "reverse"),
         12.0,
-        until=lambda view: view.speed < 0.02 or math.dist((view.x, view.y), begin) > 10.0,
+        until=lambda view: view.speed < STILL or math.dist((view.x, view.y), begin) > 10.0,
     )
     distance = math.dist((track.view.x, track.view.y), begin)
     return distance if stopped and distance <= 10.0 and track.view.upright > 0.5 else None

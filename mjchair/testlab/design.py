@@ -1,8 +1,8 @@
 """The chair that is tested: a model, a designer's changes, and the test dummy on it.
 
-In: the name of a shipped chair or a path to MJCF, chair parameters by name, and the mass of the
-dummy. Out: MuJoCo specifications of this chair, and the ids of its wheels, joints and contact
-geoms.
+In: the name of a shipped chair or a path to MJCF, chair parameters by name, the mass of the dummy,
+and the profile of a power chair's controller. Out: MuJoCo specifications of this chair, with and
+without its drive, and the ids of its wheels, joints and contact geoms.
 """
 
 from __future__ import annotations
@@ -17,9 +17,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjchair.drive.attach import has_drive
+from mjchair.drive.files import USUAL
+from mjchair.drive.quantities import Drive
 from mjchair.errors import MjchairError
+from mjchair.model import assets
 from mjchair.model.parameters import ChairParameters
-from mjchair.model.spec import compile_spec, load_spec
+from mjchair.model.spec import compile_spec, drive_file, find_drive, finished, load_spec
 from mjchair.model.visual_geoms import without_visual_geoms
 from mjchair.model.wheels import base_name, wheels
 from mjchair.tire import block
@@ -58,15 +62,19 @@ class Design:
       occupant: mass of the dummy, kg; None: the occupant of the model.
       parameters: chair parameters by name (see ChairParameters), SI or text with a unit.
       draw: how the chair differs from the stated one; None: it is the stated chair.
+      drive: of a power chair: a profile of the chair's own drive, the path of a drive's TOML, or
+        a Drive; None: the profile `normal` of its own drive, where it has one.
 
     Raises:
-      MjchairError: a dummy outside 25 to 150 kg; an unknown parameter or a value out of its range.
+      MjchairError: a dummy outside 25 to 150 kg; an unknown parameter or a value out of its range;
+        an unknown profile, or a profile for a chair without a drive.
     """
 
     model: str = "manual"
     occupant: float | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     draw: Draw | None = None
+    drive: str | Drive | None = None
 
     def __post_init__(self) -> None:
         """Freeze and check."""
@@ -78,10 +86,23 @@ class Design:
                 f"{HEAVIEST:g} kg"
             )
         self.chair_parameters()
+        if self.drive is not None:
+            self.own_drive()
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle as dictionaries, since a mapping proxy cannot be sent to another process."""
-        return Design, (self.model, self.occupant, dict(self.parameters), self.draw)
+        return Design, (self.model, self.occupant, dict(self.parameters), self.draw, self.drive)
+
+    def own_drive(self) -> Drive | None:
+        """The drive of the chair; None: a chair without one.
+
+        Raises:
+          MjchairError: as mjchair.load_drive does.
+        """
+        path = assets.find("model", self.model, assets.chairs())
+        if self.drive is None and not drive_file(path).is_file():
+            return None
+        return find_drive(USUAL if self.drive is None else self.drive, path)
 
     def chair_parameters(self) -> ChairParameters:
         """The chair parameters, with the mass of the dummy among them.
@@ -94,11 +115,12 @@ class Design:
             given["occupant_mass"] = self.occupant
         return ChairParameters.of(given)
 
-    def spec(self, visual_geoms: bool = False) -> mujoco.MjSpec:
+    def spec(self, visual_geoms: bool = False, driven: bool = False) -> mujoco.MjSpec:
         """The chair on a level floor, as a copy that may be edited.
 
         Args:
           visual_geoms: keep the geoms that are only for display.
+          driven: with the drive of the chair, whose parking brakes are closed then.
 
         Raises:
           MjchairError: as load_spec does; or the chair does not have two rear wheels and two
@@ -111,7 +133,11 @@ class Design:
             self.draw,
             visual_geoms,
         )
-        return _spec(*key).copy()
+        spec = _spec(*key).copy()
+        drive = self.own_drive() if driven else None
+        if drive is not None:
+            finished(spec, drive=drive)
+        return spec
 
 
 @functools.lru_cache(maxsize=8)
@@ -126,6 +152,11 @@ def _spec(
     spec = load_spec(model, "flat", parameters=chosen, merge_visual_geoms=False)
     if draw is not None:
         _apply(spec, draw)
+    if has_drive(spec):
+        raise MjchairError(
+            f"{model} has a drive in its MJCF; the tests put it on where they need it: take the "
+            "chair without it, with a drive.toml beside its file"
+        )
     compiled = compile_spec(spec)
     known = {base_name(wheel.name) for wheel in wheels(compiled)}
     absent = [name for name in (*REAR, *CASTERS) if name not in known]

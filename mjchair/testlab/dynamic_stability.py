@@ -6,9 +6,9 @@ steepest slope up to which no manoeuvre scores less than 2.
 
 The kinds of manoeuvres and the slopes follow the standard, and so does the event that is judged: a
 wheel lifts that should stay on the ground. The scores were not checked against the text of the
-standard, which was not available. Assumptions: the command of the drive is full; the kerb is 50 mm
-high; the anti-tippers are those of the model. The standard covers chairs with motors only; a manual
-chair is driven here by an even push.
+standard, which was not available. Assumptions: the joystick is fully deflected and not
+corrected; the kerb is 50 mm high; the anti-tippers are those of the model. The standard covers
+chairs with motors only; a manual chair is driven here by an even push.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from dataclasses import dataclass
 import mujoco
 
 from mjchair.testlab.design import Design
-from mjchair.testlab.drive import Drive, Pilot, drive_of
+from mjchair.testlab.drive import Driving, Joystick, drive_of, pilot_of
 from mjchair.testlab.obstacles import EDGE, RUN_UP, add_kerb, placed
 from mjchair.testlab.result import Grid, Result, Value
-from mjchair.testlab.track import Run, Torques, Track, View
+from mjchair.testlab.track import Command, Run, Track, View
 
 NAME = "dynamic-stability"
 SLOPES = (0.0, 3.0, 6.0, 10.0)  # deg
@@ -37,6 +37,9 @@ WORDS = {
 }
 
 
+RELEASE, REVERSE = "release", "reverse"
+
+
 @dataclass(frozen=True)
 class Manoeuvre:
     """One manoeuvre.
@@ -44,7 +47,7 @@ class Manoeuvre:
     Attributes:
       name: in words. facing: 1 up the slope, -1 down, 0 across it. begin: initial speed, m/s.
       speed, yaw: commanded, as shares of the drive's top speed and of the turn's rate.
-      then: share of the top speed that is commanded after a second; None: no change. drop: the
+      then: how it is stopped after a second, by release or by reverse; None: it goes on. drop: the
         chair drives off a kerb.
     """
 
@@ -52,19 +55,19 @@ class Manoeuvre:
     facing: int
     begin: float
     speed: float
-    then: float | None = None
+    then: str | None = None
     yaw: float = 0.0
     drop: bool = False
 
 
 MANOEUVRES = (
     Manoeuvre("start forward, facing up", 1, 0.0, 1.0),
-    Manoeuvre("stop by release, driving up", 1, 1.0, 1.0, 0.0),
-    Manoeuvre("stop by reverse, driving up", 1, 1.0, 1.0, -1.0),
+    Manoeuvre("stop by release, driving up", 1, 1.0, 1.0, RELEASE),
+    Manoeuvre("stop by reverse, driving up", 1, 1.0, 1.0, REVERSE),
     Manoeuvre("start backward, facing down", -1, 0.0, -1.0),
-    Manoeuvre("stop, driving backward down, facing up", 1, -0.6, -0.6, 0.0),
-    Manoeuvre("stop by release, driving down", -1, 1.0, 1.0, 0.0),
-    Manoeuvre("stop by reverse, driving down", -1, 1.0, 1.0, -1.0),
+    Manoeuvre("stop, driving backward down, facing up", 1, -0.6, -0.6, RELEASE),
+    Manoeuvre("stop by release, driving down", -1, 1.0, 1.0, RELEASE),
+    Manoeuvre("stop by reverse, driving down", -1, 1.0, 1.0, REVERSE),
     Manoeuvre("turn at full speed, driving across", 0, 1.0, 1.0, None, 1.0),
     Manoeuvre("turn on the spot", 1, 0.0, 0.0, None, 1.0),
     Manoeuvre("off a kerb of 50 mm, forward", -1, 0.0, 0.6, None, 0.0, True),
@@ -105,7 +108,7 @@ def dynamic_stability(design: Design, *, timestep: float | None = None) -> Resul
     steepest = Value(safe, "deg", note=note)
     notes = (
         []
-        if drive.motors
+        if isinstance(drive, Joystick)
         else [
             "The standard is for chairs with motors; here a person pushes evenly with up to "
             "35 N m a wheel."
@@ -114,7 +117,11 @@ def dynamic_stability(design: Design, *, timestep: float | None = None) -> Resul
     return Result(
         NAME,
         {"steepest_safe_slope": steepest, **values},
-        setup=["hard dry slope", "score 3 no lift, 2 lift and return, 1 stuck, 0 tips over"],
+        setup=[
+            "hard dry slope",
+            *([drive.describe()] if isinstance(drive, Joystick) else []),
+            "score 3 no lift, 2 lift and return, 1 stuck, 0 tips over",
+        ],
         grids=[Grid("Scores", ("manoeuvre", *(f"slope {s:g}" for s in SLOPES)), tuple(rows))],
         notes=notes,
         curves={"worst score": ([float(s) for s in SLOPES], [float(worst[s]) for s in SLOPES])},
@@ -125,14 +132,14 @@ def dynamic_stability(design: Design, *, timestep: float | None = None) -> Resul
 
 def score_of(
     design: Design,
-    drive: Drive,
+    drive: Driving,
     manoeuvre: Manoeuvre,
     slope: float,
     timestep: float | None = None,
 ) -> tuple[int, Run]:
     """The score of one manoeuvre on one slope (rad), and the run."""
     track = _track(design, drive, manoeuvre, slope, timestep)
-    pilot = Pilot(drive, track.view, sideways=8.0)
+    pilot = pilot_of(drive, track, sideways=8.0)
     yaw = manoeuvre.yaw * (LATERAL / drive.top_speed if manoeuvre.speed else 2.0)
     lifted = {wheel: 0.0 for wheel in track.view.parts.geoms}
     state = {"lift": False, "last": False, "since": track.view.time}
@@ -146,14 +153,10 @@ def score_of(
         if off and not over:
             state["lift"] = True
 
-    def command(view: View) -> Torques:
-        speed = manoeuvre.speed
-        rate = None
+    def command(view: View) -> Command:
         if manoeuvre.then is not None and view.time > 1.0:
-            speed = 0.0
-            rate = getattr(drive, "reverse", drive.retardation) if manoeuvre.then < 0.0 else None
-        turn = yaw if view.time > 0.5 else 0.0
-        return pilot.go(view, speed * drive.top_speed, turn, rate)
+            return pilot.stop(view, reverse=manoeuvre.then == REVERSE)
+        return pilot.ask(view, _speed(drive, manoeuvre.speed), yaw if view.time > 0.5 else 0.0)
 
     fell = track.drive(command, 4.0, until=lambda view: view.upright < 0.5, watch=watch)
     if fell:
@@ -166,7 +169,7 @@ def score_of(
 
 
 def _track(
-    design: Design, drive: Drive, manoeuvre: Manoeuvre, slope: float, timestep: float | None
+    design: Design, drive: Driving, manoeuvre: Manoeuvre, slope: float, timestep: float | None
 ) -> Track:
     uphill = slope * manoeuvre.facing
     across = slope if manoeuvre.facing == 0 else 0.0
@@ -177,10 +180,16 @@ def _track(
         design,
         slope=uphill,
         across=across,
-        speed=manoeuvre.begin * drive.top_speed,
+        speed=_speed(drive, manoeuvre.begin),
         edit=edit,
         timestep=timestep,
+        driven=True,
     )
+
+
+def _speed(drive: Driving, share: float) -> float:
+    """A share of the top speed, forward or backward, m/s."""
+    return share * (drive.top_speed if share > 0.0 else drive.reverse_speed)
 
 
 def _kerb_down(spec: mujoco.MjSpec) -> None:

@@ -7,9 +7,8 @@ straight and in turns, on tile and on carpet.
 Laps of a level track in both directions, and a continuous and a manoeuvring test, follow the
 standard. The course of the standard was not available. Assumptions: a lap consists of two straights
 of 5 m and two half turns of 1 m radius; in a manoeuvring lap the chair stops after every straight
-and turns on the spot. There is no warm-up, since temperatures are not modelled. The battery is that
-of the shipped power chair, 24 V and 50 A h, and 80 % of its charge is used. Carpet adds 0.0118 to
-the rolling resistance coefficient (Hoffman 2003).
+and turns on the spot. There is no warm-up. The battery is that of the chair's drive, and 80 % of
+its energy is used. Carpet adds 0.0118 to the rolling resistance coefficient (Hoffman 2003).
 """
 
 from __future__ import annotations
@@ -20,17 +19,16 @@ import mujoco
 import numpy as np
 
 from mjchair.testlab.design import Design
-from mjchair.testlab.drive import Drive, Pilot, drive_of
+from mjchair.testlab.drive import STILL, Joystick, Person, Pilot, drive_of, pilot_of
 from mjchair.testlab.result import Result, Value
-from mjchair.testlab.track import Run, Torques, Track, View
+from mjchair.testlab.track import Command, Run, Track, View
 from mjchair.tire import block
 
 NAME = "energy"
 CARPET = 0.0118  # 1, Hoffman 2003
-PACE = 1.0  # m/s, of manual chairs
+PACE = 1.0  # m/s, of manual chairs, and of power chairs in half turns; assumption
 TURN = 0.7  # rad/s, of the turns of a manual chair
 STRAIGHT, RADIUS = 5.0, 1.0  # m
-BATTERY = 24.0 * 50.0  # Wh; models/power/README.md: two batteries of 12 V, 50 A h
 USED = 0.8  # share of the battery's energy that is used; assumption
 WARM, READ = 2.0, 8.0  # s
 
@@ -44,7 +42,9 @@ def energy(design: Design, *, timestep: float | None = None) -> Result:
       `energy_straight_carpet`, `energy_turning_tile`, `energy_turning_carpet` (J/m).
     """
     drive = drive_of(design)
-    return _motors(design, drive, timestep) if drive.motors else _person(design, drive, timestep)
+    if isinstance(drive, Joystick):
+        return _motors(design, drive, timestep)
+    return _person(design, drive, timestep)
 
 
 def carpet(spec: mujoco.MjSpec) -> None:
@@ -56,7 +56,7 @@ def carpet(spec: mujoco.MjSpec) -> None:
             geom.userdata = tire
 
 
-def _person(design: Design, drive: Drive, timestep: float | None) -> Result:
+def _person(design: Design, drive: Person, timestep: float | None) -> Result:
     values, runs = {}, {}
     for floor, edit in (("tile", None), ("carpet", carpet)):
         for way, yaw in (("straight", 0.0), ("turning", TURN)):
@@ -82,11 +82,11 @@ def _person(design: Design, drive: Drive, timestep: float | None) -> Result:
     )
 
 
-def _steady(track: Track, drive: Drive, yaw: float) -> tuple[float, Run]:
+def _steady(track: Track, drive: Person, yaw: float) -> tuple[float, Run]:
     """Energy per metre (J/m) of steady driving, and the run."""
-    pilot = Pilot(drive, track.view)
+    pilot = pilot_of(drive, track)
 
-    def hold(view: View) -> Torques:
+    def hold(view: View) -> Command:
         return pilot.go(view, PACE, yaw)
 
     track.drive(hold, WARM)
@@ -101,20 +101,20 @@ def _steady(track: Track, drive: Drive, yaw: float) -> tuple[float, Run]:
     return (pilot.energy - before) / way[0], track.run()
 
 
-def _motors(design: Design, drive: Drive, timestep: float | None) -> Result:
+def _motors(design: Design, drive: Joystick, timestep: float | None) -> Result:
     values: dict[str, Value] = {}
     curves, runs = {}, {}
     for name, lap in (("continuous", _lap), ("manoeuvring", _manoeuvres)):
-        track = Track(design, timestep=timestep)
-        pilot = Pilot(drive, track.view)
+        track = Track(design, timestep=timestep, driven=True)
+        pilot = pilot_of(drive, track)
         seen: list[tuple[float, float]] = [(track.view.x, track.view.y)]
         for way in (1.0, -1.0):  # one lap in each direction
-            lap(track, pilot, way, seen)
+            lap(track, pilot, drive.top_speed, way, seen)
         path = np.array(seen)
         distance = float(np.hypot(*np.diff(path, axis=0).T).sum())
         used = pilot.energy / 3600.0 / (distance / 1000.0)
         values[f"consumption_{name}"] = Value(used, "Wh/km")
-        values[f"range_{name}"] = Value(BATTERY * USED / used, "km")
+        values[f"range_{name}"] = Value(drive.battery * USED / used, "km")
         curves[name] = (
             [float(x) for x in path[::10, 0]],
             [float(y) for y in path[::10, 1]],
@@ -127,10 +127,8 @@ def _motors(design: Design, drive: Drive, timestep: float | None) -> Result:
         values,
         setup=[
             f"laps of two straights of {STRAIGHT:g} m and two half turns, once each way round",
-            f"battery {BATTERY:g} Wh, {100 * USED:.0f} % used",
-        ],
-        notes=[
-            "Motor, gear, controller: assumptions at the level of torques, see testlab/drive.py."
+            f"battery {drive.battery:.0f} Wh, {100 * USED:.0f} % used",
+            drive.describe(),
         ],
         curves=curves,
         axes=("x, m", "y, m"),
@@ -164,23 +162,26 @@ def _turned(
     )
 
 
-def _lap(track: Track, pilot: Pilot, way: float, seen: list[tuple[float, float]]) -> None:
-    """Straights at full speed, half turns with a lateral acceleration of at most 2 m/s^2."""
-    top = pilot.drive.top_speed
-    around = min(top, math.sqrt(2.0 * RADIUS))
+def _lap(
+    track: Track, pilot: Pilot, top: float, way: float, seen: list[tuple[float, float]]
+) -> None:
+    """Straights at full speed, half turns at walking pace."""
+    around = min(top, PACE)
     for _ in range(2):
         _straight(track, pilot, top, seen)
         _turned(track, pilot, around, way * around / RADIUS, seen)
 
 
-def _manoeuvres(track: Track, pilot: Pilot, way: float, seen: list[tuple[float, float]]) -> None:
+def _manoeuvres(
+    track: Track, pilot: Pilot, top: float, way: float, seen: list[tuple[float, float]]
+) -> None:
     """Straights with a stop at their end, and a turn on the spot."""
     for _ in range(2):
-        _straight(track, pilot, pilot.drive.top_speed, seen)
+        _straight(track, pilot, top, seen)
         track.drive(
-            lambda view: pilot.go(view, 0.0),
+            pilot.stop,
             4.0,
-            until=lambda view: view.speed < 0.02,
+            until=lambda view: view.speed < STILL,
             watch=lambda view: _seen(seen, view),
         )
         _turned(track, pilot, 0.0, way * 1.0, seen)

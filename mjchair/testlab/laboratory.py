@@ -88,11 +88,13 @@ class Request:
 
 
 def _plain(design: Design) -> dict[str, Any]:
+    drive = design.own_drive()
     return {
         "model": design.model,
         "occupant": design.occupant,
         "parameters": dict(design.parameters),
         "draw": None if design.draw is None else asdict(design.draw),
+        "drive": None if drive is None else asdict(drive),
     }
 
 

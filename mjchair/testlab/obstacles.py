@@ -4,9 +4,9 @@ In: a design. Out: heights (mm) of a kerb with a sharp edge, climbed and descend
 backward, from rest with the wheels at the kerb and with a run-up of 0.5 m.
 
 The directions and the run-up follow the standard, and so does the result, the highest obstacle that
-the chair passes. Heights are tried in steps of 5 mm. Assumptions: the drive of
-mjchair.testlab.drive gives its full torque; nobody leans or lifts the casters, so a manual chair
-climbs without a wheelie.
+the chair passes. Heights are tried in steps of 5 mm. Assumptions: a power chair is driven
+with its joystick, a manual one by an even push, at up to 1 m/s; nobody leans or lifts the casters,
+so a manual chair climbs without a wheelie.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ import mujoco
 from mjchair.simulation.settling import NotStandingError
 from mjchair.testlab.closed_form import UP
 from mjchair.testlab.design import Design, lowest
-from mjchair.testlab.drive import Pilot, drive_of
+from mjchair.testlab.drive import Joystick, drive_of, pilot_of
 from mjchair.testlab.result import Result, Value
 from mjchair.testlab.track import Run, Track, View
 
 NAME = "obstacles"
 HEIGHTS = tuple(range(5, 205, 5))  # mm
+PACE = 1.0  # m/s, that is asked for; assumption
 RUN_UP = 0.5  # m
 EDGE = 2.0  # m, x of the kerb's edge
 TIME = 6.0  # s, for one attempt
@@ -59,7 +60,9 @@ def obstacles(design: Design, *, timestep: float | None = None) -> Result:
         setup=[
             "kerb with a sharp edge across the way",
             f"run-up {RUN_UP:g} m, or from rest with the first wheels 10 mm before the edge",
-            "motors" if drive.motors else "a person pushes with up to 35 N m a wheel, no wheelie",
+            drive.describe()
+            if isinstance(drive, Joystick)
+            else "a person pushes with up to 35 N m a wheel, no wheelie",
         ],
         notes=[
             "Passed: all wheels are beyond the edge, upright, within 6 s. A chair whose frame "
@@ -141,26 +144,26 @@ def attempt(
             body.pos = (body.pos[0], body.pos[1], body.pos[2] + height)
 
     try:
-        track = Track(design, edit=placed(edit, start, heading), timestep=timestep)
+        track = Track(design, edit=placed(edit, start, heading), timestep=timestep, driven=True)
     except NotStandingError:  # it stands without the kerb: its frame is over the edge
         return False, None
     drive = drive_of(design)
-    pilot = Pilot(drive, track.view)
-    sign = 1.0 if forward else -1.0
+    pilot = pilot_of(drive, track)
+    speed = min(drive.top_speed, PACE) if forward else -min(drive.reverse_speed, PACE)
 
     def beyond(view: View) -> bool:
         places = (float(view.data.geom_xpos[g][0]) for g in view.parts.geoms.values())
         return all(place > EDGE + 0.05 for place in places)
 
     ended = track.drive(
-        lambda view: pilot.go(view, sign * min(drive.top_speed, 1.0)),
+        lambda view: pilot.go(view, speed),
         TIME,
         until=lambda view: beyond(view) or view.upright < 0.5,
     )
     view = track.view
     if not ended or view.upright < 0.5:
         return False, None
-    track.drive(lambda view: pilot.go(view, 0.0), 1.0)
+    track.drive(pilot.stop, 1.0)
     stands = view.upright > 0.94 and all(
         lowest(view.model, view.data, g, UP)[2] > (height if climbs else 0.0) - 0.01
         for g in view.parts.geoms.values()

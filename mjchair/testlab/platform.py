@@ -34,6 +34,7 @@ RATE = math.radians(2.0)  # rad/s, of the platform
 FITTED = math.radians(1.5)  # rad: the last part of the tilt, to which the load curve is fitted
 FEWEST = 15  # samples in this fit
 HURRY, NEAR = 8.0, 0.06  # rate factor until only this share of the weight is left uphill
+WHEELS = 4  # that the platform knows
 MOST = math.radians(60.0)  # largest tilt
 TICK = 0.01  # s, between two readings of the loads
 HELD = 1e6  # N m s/rad, damping of every hinge while the chair settles
@@ -108,6 +109,12 @@ class Platform:
         if timestep is not None:
             spec.option.timestep = timestep
         first = compile_spec(spec)
+        wheels = len(parts(first).geoms)
+        if wheels != WHEELS:
+            raise MjchairError(
+                f"the tilting platform takes a chair with two rear wheels and two casters; "
+                f"{design.model} has {wheels} wheels"
+            )
         self._edit(first)
         data = self._settled(first)
         if setup.stops and not self._sticking():

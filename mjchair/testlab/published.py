@@ -19,7 +19,7 @@ from mjchair.errors import MjchairError
 from mjchair.testlab.brakes import brakes
 from mjchair.testlab.classes import table
 from mjchair.testlab.design import Design
-from mjchair.testlab.drive import drive_of
+from mjchair.testlab.drive import Joystick, drive_of
 from mjchair.testlab.energy import carpet, energy
 from mjchair.testlab.platform import Platform, Setup
 from mjchair.testlab.result import Grid, Result, Value
@@ -39,7 +39,9 @@ def published(design: Design, *, timestep: float | None = None) -> Result:
       value, the simulated one, and the reason for the difference.
     """
     drive = drive_of(design)
-    simulated = _power(design, timestep) if drive.motors else _manual(design, timestep)
+    simulated = (
+        _power(design, timestep) if isinstance(drive, Joystick) else _manual(design, timestep)
+    )
     rows, values = [], {}
     for entry in table()["published"]:
         value = simulated.get(entry["key"])

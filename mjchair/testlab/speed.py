@@ -4,7 +4,7 @@ In: a design. Out: greatest speed forward and backward (m/s), greatest accelerat
 retardation (m/s^2) on a level floor.
 
 The quantities, the level floor and the release of the joystick follow the standard. Assumptions:
-the numbers of the drive (mjchair.testlab.drive); accelerations are means over 0.2 s.
+the numbers of the chair's drive; accelerations are means over 0.2 s.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from mjchair.testlab.design import Design
-from mjchair.testlab.drive import Drive, Pilot, drive_of
+from mjchair.testlab.drive import Joystick, drive_of, pilot_of
 from mjchair.testlab.result import Result, Value
 from mjchair.testlab.track import Track, View
 
@@ -27,7 +27,7 @@ def speed(design: Design, *, timestep: float | None = None) -> Result:
       `top_speed_forward`, `top_speed_backward` (m/s), `acceleration`, `retardation` (m/s^2).
     """
     drive = drive_of(design)
-    if not drive.motors:
+    if not isinstance(drive, Joystick):
         return Result(NAME, missing=NO_MOTOR)
     values, curves, runs = {}, {}, {}
     for name, sign in (("forward", 1.0), ("backward", -1.0)):
@@ -44,7 +44,7 @@ def speed(design: Design, *, timestep: float | None = None) -> Result:
     return Result(
         NAME,
         values,
-        setup=["level hard floor, from rest, full joystick, then released"],
+        setup=["level hard floor, from rest, full joystick, then released", drive.describe()],
         curves=curves,
         axes=("time, s", "speed, m/s"),
         runs=runs,
@@ -52,16 +52,17 @@ def speed(design: Design, *, timestep: float | None = None) -> Result:
 
 
 def _there_and_still(
-    design: Design, drive: Drive, sign: float, timestep: float | None
+    design: Design, drive: Joystick, sign: float, timestep: float | None
 ) -> tuple[list[tuple[float, float]], Track]:
     """Full joystick for 5 s, then release: time (s) and speed (m/s) in the commanded direction."""
-    track = Track(design, timestep=timestep)
-    pilot = Pilot(drive, track.view)
+    track = Track(design, timestep=timestep, driven=True)
+    pilot = pilot_of(drive, track)
     seen: list[tuple[float, float]] = []
 
     def watch(view: View) -> None:
         seen.append((view.time, sign * view.speed))
 
-    track.drive(lambda view: pilot.go(view, sign * drive.top_speed), 5.0, watch=watch)
-    track.drive(lambda view: pilot.go(view, 0.0), 2.5, watch=watch)
+    full = drive.top_speed if sign > 0.0 else -drive.reverse_speed
+    track.drive(lambda view: pilot.ask(view, full), 5.0, watch=watch)
+    track.drive(pilot.stop, 2.5, watch=watch)
     return seen, track

@@ -2,7 +2,8 @@
 
 In: a chair, a slope, obstacles on the floor, and a driver. Out: whether the condition for the end
 was met, and a run from which a recording can be made. A driver is a function that is called every
-10 ms with a `View` of the chair and returns the torques (N m) on the left and the right wheel.
+10 ms with a `View` of the chair and returns a command: the torques (N m) on the left and the right
+wheel, or the joystick's deflections forward and to the left on a chair that has its drive on.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjchair.drive.attach import drives
 from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
 from mjchair.model.spec import compile_spec
@@ -26,8 +28,9 @@ from mjchair.simulation.recording import Recording
 from mjchair.testlab.design import GRAVITY, Design, floor_of, parts
 
 Array = NDArray[np.float64]
-Torques = tuple[float, float]
+Command = tuple[float, float]  # torques, N m, or deflections of the joystick, -1 to 1
 
+WHEELS = ("left_wheel", "right_wheel")  # torque inputs
 TICK = 0.01  # s, between two calls of a driver
 FAST = 1e3  # m/s or rad/s; a simulation with a larger speed has diverged
 
@@ -158,10 +161,10 @@ class View:
         return False
 
 
-Driver = Callable[[View], Torques]
+Driver = Callable[[View], Command]
 
 
-def coast(view: View) -> Torques:
+def coast(view: View) -> Command:
     """A driver that does nothing."""
     return 0.0, 0.0
 
@@ -183,6 +186,7 @@ class Track:
         place: tuple[float, float, float] | None = None,
         casters: Mapping[str, float] | None = None,
         timestep: float | None = None,
+        driven: bool = False,
     ) -> None:
         """Place the chair, settled on its tires; with a speed, its wheels roll without slip.
 
@@ -195,10 +199,12 @@ class Track:
           place: x, y (m) of the axle and heading (rad); None: as in the model.
           casters: caster -> angle by which its swivel is turned at the start, rad.
           timestep: s.
+          driven: put the chair's drive on; a chair without one takes torques all the same. At rest
+            its parking brakes are closed.
         """
-        self.design, self._edit = design, edit
+        self.design, self._edit, self._driven = design, edit, driven
         self._off = () if anti_tippers else ("off",)
-        spec = design.spec()
+        spec = design.spec(driven=driven)
         if edit is not None:
             edit(spec)
         if timestep is not None:
@@ -217,16 +223,21 @@ class Track:
         position = None if place is None else place[:2]
         heading = None if place is None else place[2]
         initial = Initial(position, heading, speed, yaw_rate)
+        known = names.actuators(self.model)
+        self._inputs = [names.find(name, known, "actuator") for name in WHEELS]
+        first = np.zeros(self.model.nu)
+        drive = design.own_drive() if driven else None
+        if drive is not None:
+            self._inputs = list(drives(self.model)[0].joystick)
+            first[self._inputs] = drive.joystick(speed, yaw_rate)
         with installed():
-            self.data = start(self.model, initial, brakes)
+            self.data = start(self.model, initial, brakes, first)
             for caster, angle in (casters or {}).items():
                 joint = listed.swivels[caster]
                 self.data.qpos[self.model.jnt_qposadr[joint]] += angle
             mujoco.mj_forward(self.model, self.data)
         self.view = View(self.model, self.data)
         self._trace = Trace(self.model, tires=True)
-        known = names.actuators(self.model)
-        self._drives = [names.find(w, known, "actuator") for w in ("left_wheel", "right_wheel")]
 
     def drive(
         self,
@@ -252,7 +263,7 @@ class Track:
         with installed():
             for _ in range(max(1, round(duration / (steps * self.model.opt.timestep)))):
                 self._trace.add(self.data)
-                self.data.ctrl[self._drives] = driver(self.view)
+                self.data.ctrl[self._inputs] = driver(self.view)
                 mujoco.mj_step(self.model, self.data, nstep=steps)
                 self.view.update()
                 if not np.abs(self.data.qvel).max() < FAST:
@@ -269,7 +280,7 @@ class Track:
         """The run so far; with `visual_geoms`, its recording can be filmed."""
         spec = None
         if visual_geoms:
-            spec = self.design.spec(visual_geoms=True)
+            spec = self.design.spec(visual_geoms=True, driven=self._driven)
             if self._edit is not None:
                 self._edit(spec)
         return self._trace.run(spec)

@@ -22,9 +22,9 @@ from mjchair.model.seating import PERSON
 from mjchair.model.spec import compile_spec
 from mjchair.model.wheels import base_name
 from mjchair.testlab.design import Design, is_anti_tipper, parts
-from mjchair.testlab.drive import Pilot, drive_of
+from mjchair.testlab.drive import Pilot, drive_of, pilot_of
 from mjchair.testlab.result import Result, Value
-from mjchair.testlab.track import Run, Torques, Track, View
+from mjchair.testlab.track import Command, Run, Track, View
 
 Array = NDArray[np.float64]
 
@@ -84,7 +84,7 @@ def _circle(swept: Array) -> dict[str, tuple[list[float], list[float]]]:
     return {"turn on the spot": ([float(a) for a in x], [float(b) for b in y])}
 
 
-def _about_the_left_wheel(pilot: Pilot, view: View) -> Torques:
+def _about_the_left_wheel(pilot: Pilot, view: View) -> Command:
     return pilot.go(view, 0.5 * pilot.track * YAW, YAW)
 
 
@@ -156,8 +156,8 @@ def _cloud(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Array:
 
 def _driven(design, drive, angle, timestep) -> Array:  # type: ignore[no-untyped-def]
     """Positions (n, 3) of the axle, x, y (m) and heading (rad), during a turn by `angle` (rad)."""
-    track = Track(design, timestep=timestep)
-    pilot = Pilot(drive_of(design), track.view)
+    track = Track(design, timestep=timestep, driven=True)
+    pilot = pilot_of(drive_of(design), track)
     places: list[tuple[float, float, float]] = []
     track.drive(
         lambda view: drive(pilot, view),
@@ -205,8 +205,8 @@ def _reversing(design: Design, outline: Array, timestep: float | None) -> tuple[
     The chair turns by 60 deg each time: forward about a point beside it, backward about a point on
     the other side, and forward again. The radius of each turn equals the track of the rear wheels.
     """
-    track = Track(design, timestep=timestep)
-    pilot = Pilot(drive_of(design), track.view)
+    track = Track(design, timestep=timestep, driven=True)
+    pilot = pilot_of(drive_of(design), track)
     places: list[tuple[float, float, float]] = []
     radius = pilot.track
 
