@@ -20,6 +20,7 @@ from mjchair.measurement.trial import Trial
 from mjchair.report.replay.measured import measured_track
 from mjchair.report.replay.page import Replay, replay
 from mjchair.report.replay.track import RATE, poses, slerp, track
+from mjchair.simulation.recording import GRAVITY
 from mjchair.simulation.stored_model import StoredModel
 
 CLOSE = 1e-4  # m
@@ -218,10 +219,7 @@ def test_keys_mouse_and_touch_move_the_time(page, turning):
     page.press(" ")
     played = page.value("mjchair.time")
     assert page.value("new Promise((d) => setTimeout(() => d(mjchair.time), 200))") == played
-    box = page.value(
-        "(() => {const r = document.querySelector('.panel .box').getBoundingClientRect();"
-        "return [r.left, r.top, r.width, r.height]})()"
-    )
+    box = first_diagram(page)
     middle = (box[0] + 0.5 * box[2], box[1] + 0.5 * box[3])
     page.mouse("mousePressed", *middle)
     page.mouse("mouseReleased", *middle)
@@ -234,10 +232,7 @@ def test_keys_mouse_and_touch_move_the_time(page, turning):
 @browser
 def test_the_pointer_over_a_diagram_tells_the_values_there(page, turning):
     page.value("mjchair.seek(0)")
-    box = page.value(
-        "(() => {const r = document.querySelector('.panel .box').getBoundingClientRect();"
-        "return [r.left, r.top, r.width, r.height]})()"
-    )
+    box = first_diagram(page)
     torque = turning["left_wheel"]
     at = turning.time[int(np.argmax(torque))]
     x = box[0] + 46 + at / turning.time[-1] * (box[2] - 50)
@@ -263,6 +258,30 @@ def test_the_camera_follows_stays_or_looks_from_above(page):
 
 
 @browser
+def test_gravity_that_leans_points_down_in_the_picture_of_a_telephone(other, tmp_path):
+    """As on a platform that tilts. The window is small, and all of the page fits its width."""
+    lean = np.linspace(0.1, 0.4, other.time.size)  # rad, towards the chair's front left
+    down = np.column_stack([np.sin(lean) * 0.8, np.sin(lean) * 0.6, -np.cos(lean)])
+    gravity = dict(zip(GRAVITY, (9.81 * down).T, strict=True))
+    tilted = dataclasses.replace(other, channels=dict(other.channels) | gravity)
+    replay(tilted).save(tmp_path / "run.html")
+    sample = other.time.size // 2
+    followed = track(other)
+    at = int(np.searchsorted(followed.time, other.time[sample]))
+    middle = followed.path[at] + (0.0, 0.0, 0.4)
+    with Page(tmp_path / "run.html", 390, 780) as opened:
+        opened.value("window.mjchair.ready.then(() => 0)")
+        opened.value(f"mjchair.seek({followed.time[at]})")
+        along = [list(middle + s * down[sample]) for s in (-0.4, 0.0, 0.4)]
+        columns, rows = np.transpose(opened.value(f"{json.dumps(along)}.map(mjchair.pixel)"))
+        assert np.ptp(columns) < 1.0 and (np.diff(rows) > 20.0).all()
+        assert opened.value("document.documentElement.scrollWidth") <= 390
+        under = "document.getElementById('forces').getBoundingClientRect().top"
+        assert opened.value(f"{under} >= document.getElementById('scene').clientHeight")
+        assert opened.errors == []
+
+
+@browser
 def test_without_webgl_it_is_a_still_picture_and_one_line(shown):
     with Page(shown, webgl=False) as opened:
         opened.value("window.mjchair.ready.then(() => 0)")
@@ -274,8 +293,17 @@ def test_without_webgl_it_is_a_still_picture_and_one_line(shown):
         assert opened.requests == [] and opened.errors == []
 
 
+def first_diagram(page):
+    """Left, top, width and height of the first diagram, pixels, after it has been scrolled to."""
+    return page.value(
+        "(() => {const box = document.querySelector('.panel .box'); box.scrollIntoView();"
+        "const r = box.getBoundingClientRect(); return [r.left, r.top, r.width, r.height]})()"
+    )
+
+
 def picture(page):
     """The drawn part of the page as an array, after it has been drawn."""
+    page.value("scrollTo(0, 0)")
     page.value("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
     return np.asarray(Image.open(io.BytesIO(page.picture())).convert("RGB"))[:400]
 

@@ -107,7 +107,7 @@ def static_stability(
 
 
 _NOTE = (
-    "The closed form is that of a rigid chair; `own tires` repeats the test on tires of the "
+    'The closed form is that of a rigid chair. "own tires" repeats the test on tires of the '
     "model's stiffness. The downhill tires deflect under the growing load, so the chair tips at a "
     "slightly smaller angle."
 )

@@ -37,7 +37,7 @@ from mjchair.report.gl import NoGraphicsError
 from mjchair.report.replay.measured import measured_track
 from mjchair.report.replay.packing import pack, packed
 from mjchair.report.replay.shapes import Shapes, shapes
-from mjchair.report.replay.track import MOST, Track, track
+from mjchair.report.replay.track import MOST, Track, force_channels, track
 from mjchair.simulation.recording import Recording
 from mjchair.storage import write_whole
 
@@ -48,6 +48,7 @@ QUALITY = 80  # of the still picture, JPEG
 GHOSTS = (colours.BEFORE, colours.MEASURED, "#009e73", "#cc79a7")
 BODY = colours.AFTER
 FIRST_SHOWN = 3  # diagrams that are open at first
+NO_FORCE = "no tire has a force in this run, so there are no arrows"
 HEIGHT = 720  # pixels, of a frame in a notebook or a report
 
 Shown = Recording | Trial
@@ -127,6 +128,8 @@ def replay(
             arrays |= surface.arrays(f"model{m}.surface{s}")
     for t, one in enumerate(tracks):
         arrays |= one.arrays(f"track{t}")
+    shown = np.searchsorted(recording.time, tracks[0].time)
+    arrays["down"] = recording.down()[shown].astype(np.float32)
     blocks, text = pack(arrays)
     header = {
         "models": [_model(model) for model in models],
@@ -206,10 +209,7 @@ def _colour_of(number: int) -> str:
 
 
 def _track(one: Track, model: int, colour: str) -> dict[str, Any]:
-    wheels = {
-        wheel: {component: f"{wheel}_tire.{axis}" for component, axis in COMPONENTS.items()}
-        for wheel in one.contacts
-    }
+    wheels = {wheel: force_channels(wheel) for wheel in one.contacts if _carry(one)}
     return {
         "label": one.label,
         "model": model,
@@ -298,12 +298,20 @@ def _colour(name: str, index: int) -> str:
     return colours.SERIES[index % len(colours.SERIES)]
 
 
+def _carry(one: Track) -> bool:
+    """Whether a tire has a force at any time; a chair may also be held by MuJoCo's own contacts."""
+    channels = [channel for wheel in one.contacts for channel in force_channels(wheel).values()]
+    return any(one.signals[name].any() for name in channels if name in one.signals)
+
+
 def _notes(tracks: Sequence[Track]) -> list[str]:
     """What is to be said of the runs in the page."""
     notes = []
     for one in tracks:
         name = f"{one.label}: " if len(tracks) > 1 else ""
         notes.append(f"{name}{one.status}")
+        if one.contacts and not _carry(one):
+            notes.append(f"{name}{NO_FORCE}")
         if one.rate is not None:
             notes.append(
                 f"{name}thinned: {one.rate:.3g} samples a second are shown of those recorded; what "

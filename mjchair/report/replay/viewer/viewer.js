@@ -184,9 +184,12 @@
     const far = 400, width = 2 * solid.size[0] || far, depth = 2 * solid.size[1] || far;
     const texture = tiles();
     texture.repeat.set(width / 2, depth / 2);
-    const mesh = new THREE.Mesh(new THREE.PlaneGeometry(width, depth),
-      new THREE.MeshLambertMaterial({ map: texture, side: THREE.DoubleSide }));
+    const geometry = new THREE.PlaneGeometry(width, depth);
+    const mesh = new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({ map: texture }));
     mesh.applyMatrix4(placed(solid));
+    // from below, as where a platform tilts away from the camera, the chair is seen through it
+    mesh.add(new THREE.Mesh(geometry.clone().rotateX(Math.PI), new THREE.MeshBasicMaterial(
+      { map: texture, transparent: true, opacity: 0.3, depthWrite: false })));
     if (!solid.size[0] && !solid.size[1]) {
       // an endless plane is moved in whole pairs of tiles, so that its pattern stays in place
       const local = new THREE.Vector3(...middle).applyMatrix4(placed(solid).invert());
@@ -342,6 +345,13 @@
     return values ? values[k] : 0;
   }
 
+  // Direction of gravity, 1, world.
+  function downAt(time) {
+    const [k, share] = moment(timesOf(0), time), next = share > 0 ? k + 1 : k;
+    const at = (i) => new THREE.Vector3(...[0, 1, 2].map((c) => arrays.down.values[c * arrays.down.rows + i]));
+    return at(k).lerp(at(next), share).normalize();
+  }
+
   class Stage {
     constructor(canvas) {
       this.canvas = canvas;
@@ -361,7 +371,9 @@
       this.scene.add(this.light, this.light.target);
       const parts = page.models.map((_, m) => partsOf(m));
       this.chairs = page.tracks.map((track, number) => new Chair(number, parts[track.model]));
-      for (const chair of this.chairs) this.scene.add(chair.group, chair.paths, chair.forces);
+      this.world = new THREE.Group();
+      for (const chair of this.chairs) this.world.add(chair.group, chair.paths, chair.forces);
+      this.scene.add(this.world);
       const start = this.chairs[0].middle(0, 0);
       for (const solid of page.models[page.tracks[0].model].solids)
         if (solid.kind === "plane") this.chairs[0].bodies[solid.body].add(plane(solid, start.toArray()));
@@ -380,6 +392,7 @@
       let middle = null;
       for (const chair of this.chairs) { const at = chair.show(time); middle ??= at; }
       middle.z += 0.4;
+      this.standUpright(middle, downAt(time));
       if (this.middle && this.mode !== "orbit") {
         const moved = middle.clone().sub(this.middle);
         this.camera.position.add(moved);
@@ -389,6 +402,21 @@
       this.light.position.copy(middle).add(new THREE.Vector3(1.8, 1.2, 4.5));
       this.light.target.position.copy(middle);
       this.dirty = true;
+    }
+
+    // Turn the world about a point until gravity points down in the picture: a floor that tilts
+    // under gravity, or gravity that leans, is then seen as a tilted floor.
+    standUpright(about, down) {
+      this.world.quaternion.setFromUnitVectors(down.negate(), this.camera.up);
+      this.world.position.copy(about).sub(about.clone().applyQuaternion(this.world.quaternion));
+      this.world.updateMatrixWorld();
+    }
+
+    // Column and row of the picture, pixels, where a point of the world, m, is drawn.
+    pixel(point) {
+      this.camera.updateMatrixWorld();
+      const seen = new THREE.Vector3(...point).applyMatrix4(this.world.matrixWorld).project(this.camera);
+      return [0.5 * (1 + seen.x) * this.canvas.clientWidth, 0.5 * (1 - seen.y) * this.canvas.clientHeight];
     }
 
     // follow: beside the chair and along with it; orbit: stays where it is; top: from above.
@@ -426,7 +454,8 @@
 
   // ---- signals -----------------------------------------------------------------------------
 
-  const short = (value) => (Number.isFinite(value) ? String(+value.toPrecision(4)) : "–");
+  const short = (value) => (!Number.isFinite(value) ? "–"
+    : value && Math.abs(value) < 1e-3 ? (+value.toPrecision(2)).toExponential() : String(+value.toPrecision(4)));
 
   // Values at which lines of a diagram are drawn: about three, at round numbers.
   function rounds(low, high) {
@@ -565,8 +594,8 @@
       this.panels = [];
       this.changed = true;
       $("scrub").min = this.begin; $("scrub").max = this.end;
-      this.buildLegend();
       this.buildShown();
+      this.buildForces();
       this.buildChoices();
       this.listen();
       const tick = (now) => { this.tick(now); window.requestAnimationFrame(tick); };
@@ -616,61 +645,61 @@
       for (const b of document.querySelectorAll("#cameras button")) b.setAttribute("aria-pressed", String(b.dataset.camera === mode));
     }
 
-    // The table of the forces that the arrows stand for.
-    buildLegend() {
+    // The table of the forces: a row for each component with its switch and scale, a column for each wheel.
+    buildForces() {
       const wheels = Object.keys(page.tracks[0].contacts);
-      if (!wheels.length) return;
+      if (!wheels.length || !this.stage) return;
+      this.stage.chairs.forEach((chair, number) => { chair.forces.visible = number === 0; });
       const table = document.createElement("table"), head = table.insertRow();
-      head.insertCell().textContent = "N";
-      for (const [component, force] of Object.entries(page.forces)) {
-        const cell = head.insertCell(), swatch = document.createElement("span");
-        swatch.className = "swatch"; swatch.style.background = force.colour;
-        cell.append(swatch, `${component}, ${force.scale} N/m`);
+      for (const title of ["force (N)", "arrow", ...wheels.map((wheel) => wheel.replaceAll("_", " "))]) {
+        const cell = document.createElement("th");
+        cell.textContent = title;
+        head.append(cell);
       }
-      this.forceCells = wheels.map((wheel) => {
+      this.forceBoxes = [];
+      this.forceCells = Object.entries(page.forces).map(([component, force]) => {
         const row = table.insertRow();
-        row.insertCell().textContent = wheel.replaceAll("_", " ");
-        return [wheel, Object.keys(page.forces).map((component) => [component, row.insertCell()])];
+        this.forceBoxes.push(this.box(row.insertCell(), component, force.colour, (on) => {
+          for (const chair of this.stage.chairs)
+            for (const arrows of Object.values(chair.arrows)) arrows[component].group.children.forEach((mesh) => { mesh.visible = on; });
+        }));
+        row.insertCell().textContent = `${force.scale} N/m`;
+        return [component, wheels.map((wheel) => [wheel, row.insertCell()])];
       });
-      $("legend").append(table);
+      $("forces").append(table);
     }
 
     writeForces() {
       const [k, share] = moment(timesOf(0), this.time), sample = share < 0.5 ? k : k + 1;
-      for (const [wheel, cells] of this.forceCells ?? [])
-        for (const [component, cell] of cells) cell.textContent = String(Math.round(forceAt(0, wheel, component, sample)) || 0);
+      for (const [component, cells] of this.forceCells ?? [])
+        for (const [wheel, cell] of cells) cell.textContent = String(Math.round(forceAt(0, wheel, component, sample)) || 0);
     }
 
-    // Boxes that show and hide chairs, paths and the components of the forces.
+    // A box that switches something in the scene on and off; it is on at first.
+    box(parent, label, colour, set) {
+      const element = document.createElement("label"), box = document.createElement("input");
+      box.type = "checkbox"; box.checked = true;
+      const apply = () => { set(box.checked); this.stage.dirty = true; };
+      box.addEventListener("change", apply);
+      element.append(box);
+      if (colour) { const s = document.createElement("span"); s.className = "swatch"; s.style.background = colour; element.append(s); }
+      element.append(" " + label);
+      parent.append(element);
+      apply();
+      return box;
+    }
+
+    // Boxes that show and hide chairs and paths.
     buildShown() {
-      const add = (label, colour, checked, set) => {
-        const element = document.createElement("label"), box = document.createElement("input");
-        box.type = "checkbox"; box.checked = checked;
-        const apply = () => { set(box.checked); if (this.stage) this.stage.dirty = true; };
-        box.addEventListener("change", apply);
-        element.append(box);
-        if (colour) { const s = document.createElement("span"); s.className = "swatch"; s.style.background = colour; element.append(s); }
-        element.append(" " + label);
-        $("shown").append(element);
-        apply();
-        return box;
-      };
       if (!this.stage) return;
       page.tracks.forEach((track, number) => {
-        if (page.tracks.length > 1) add(track.label, track.colour, true, (on) => {
+        if (page.tracks.length > 1) this.box($("shown"), track.label, track.colour, (on) => {
           const chair = this.stage.chairs[number];
           chair.bodies.forEach((body, b) => { if (b > 0) body.visible = on; });
           chair.hidden = !on; chair.forces.visible = on && number === 0; chair.paths.visible = on && this.pathShown !== false;
         });
       });
-      add("path", null, true, (on) => { this.pathShown = on; for (const chair of this.stage.chairs) chair.paths.visible = on && !chair.hidden; });
-      if (!Object.keys(page.tracks[0].contacts).length) return;
-      this.stage.chairs.forEach((chair, number) => { chair.forces.visible = number === 0; });
-      this.forceBoxes = Object.entries(page.forces).map(([component, force]) =>
-        add(`${component} force`.replace("load force", "load"), force.colour, true, (on) => {
-          for (const chair of this.stage.chairs)
-            for (const arrows of Object.values(chair.arrows)) arrows[component].group.children.forEach((mesh) => { mesh.visible = on; });
-        }));
+      this.box($("shown"), "path", null, (on) => { this.pathShown = on; for (const chair of this.stage.chairs) chair.paths.visible = on && !chair.hidden; });
     }
 
     buildChoices() {
@@ -738,6 +767,7 @@
 
   // ready: a promise, kept when the page can be used.
   // pose(time, body, track = 0): [x, y, z, qw, qx, qy, qz], m, world, of a body by name or number.
+  // pixel(point): column and row, pixels, where a point of the world (m) is drawn in the picture.
   // bodies, tracks: names. seek(time), play(), pause(), look(mode): as the controls do. time: shown, s.
   let player = null;
   window.mjchair = {
@@ -745,6 +775,7 @@
       const number = bodyNumber(track, body), [k, share] = moment(timesOf(track), time);
       return poseAt(track, number, k, share);
     },
+    pixel(point) { return player.stage.pixel(point); },
     bodies: bodiesOf(0),
     tracks: page.tracks.map((t) => t.label),
     seek(time) { player.pause(); player.seek(time); player.refresh(); },
@@ -772,7 +803,7 @@
       stage = new Stage($("scene"));
     } else {
       $("notice").textContent = "This picture stands still: the browser draws nothing in three dimensions (no WebGL). The signals below work.";
-      $("cameras").hidden = $("legend").hidden = true;
+      $("cameras").hidden = $("forces").hidden = true;
     }
     player = new Player(stage);
     player.look("follow");
