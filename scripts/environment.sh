@@ -19,7 +19,8 @@ fi
 rm -rf "$venv"
 "$python" -m venv "$venv"
 # the lock names all that is used; what kineticstoolkit wants besides (PyQt5, 200 MB, for windows; a
-# look for news over the network at import) stays away
-"$venv/bin/pip" install --quiet --no-deps --requirement requirements.lock
+# look for news over the network at import) stays away. Python compiles modules when they are first
+# imported, which are far fewer than --no-compile leaves out.
+"$venv/bin/pip" install --quiet --no-compile --no-deps --requirement requirements.lock
 "$venv/bin/pip" install --quiet --no-deps --no-build-isolation --editable .
 "$venv/bin/python" scripts/compile_tires.py  # so that no first run waits for them

@@ -68,7 +68,8 @@ def names_page() -> str:
 
 
 def _shown_as(name: str) -> str:
-    return f"    options:\n      heading_level: 2\n      toc_label: mjchair.{name}\n"
+    named = f"      heading: mjchair.{name}\n      toc_label: mjchair.{name}\n"
+    return f"    options:\n      heading_level: 2\n{named}"
 
 
 def _whole(module: ModuleType, path: str) -> str:
@@ -81,7 +82,7 @@ def _whole(module: ModuleType, path: str) -> str:
             told.append(
                 f"::: {value.__module__}.{value.__qualname__}\n"
                 "    options:\n      heading_level: 3\n"
-                f"      toc_label: {path}.{name}\n"
+                f"      heading: {path}.{name}\n      toc_label: {path}.{name}\n"
             )
     return "\n".join(told)
 
@@ -130,7 +131,10 @@ def effects_page() -> str:
         + "`weak_motor`, `low_battery` and `dragging_brake` are of chairs with a drive.\n",
     ]
     for effect in (*MECHANICAL, *(find(name, EXAMPLE) for name in SENSORS)):
-        told += [f"## {effect.name}\n", f"{_text(effect.signature)}.\n"]
+        known = f"## {effect.name}\n" in told
+        form = f"### where `{effect.measured}` is a column\n"
+        told.append(form if known else f"## {effect.name}\n")
+        told.append(f"{_text(effect.signature)}.\n")
         told += [
             "| parameter | unit | usual size | from | to | none at |",
             "|---|---|---|---|---|---|",

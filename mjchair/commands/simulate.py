@@ -86,7 +86,9 @@ def _add_drive(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="--input keeps each value until the next sample; without: straight lines",
     )
-    group.add_argument("--push-period", type=options.number, metavar="S", help="s")
+    group.add_argument(
+        "--push-period", type=options.number, metavar="S", help="from stroke to stroke, s"
+    )
     group.add_argument("--push-time", type=options.number, metavar="S", help="of a stroke, s")
 
 

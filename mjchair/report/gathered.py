@@ -9,14 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mjchair.measurement.gather.instruments import Instrument
 from mjchair.measurement.gather.join import GatheredTrial
 from mjchair.report.colours import FAINT, NOTE, SERIES, SIDES
+from mjchair.report.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -28,9 +27,8 @@ STYLES = ("-", "--", ":", "-.")
 def gathered_figure(trials: Sequence[GatheredTrial]) -> Figure:
     """Wheel speeds of all instruments, the torque after its baseline, and turning rates."""
     shown = _different(trials)[:MOST]
-    figure, axes = plt.subplots(
-        len(shown), 2, figsize=(12.0, ROW * len(shown) + 0.9), layout="constrained", squeeze=False
-    )
+    figure = Figure(figsize=(12.0, ROW * len(shown) + 0.9), layout="constrained")
+    axes = figure.subplots(len(shown), 2, squeeze=False)
     for trial, (left, right) in zip(shown, axes, strict=True):
         _speeds(left, trial)
         _second(right, trial)

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mjchair.report.colours import AXIS_LINE, SERIES
+from mjchair.report.figure import Figure
 from mjchair.simulation.rig import Run
 from mjchair.tire import Tire, law
 

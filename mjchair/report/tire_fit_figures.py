@@ -6,11 +6,11 @@ In: a fit of mjchair.identification. Out: a matplotlib figure.
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from mjchair.identification.causes import added_force
 from mjchair.identification.fit import Fit
 from mjchair.report.colours import AXIS_LINE
+from mjchair.report.figure import Figure
 from mjchair.report.rig_figures import SIGN, load_colour
 
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
 from mjchair.report.colours import FORCES, PATH, WHEEL
+from mjchair.report.figure import Figure
 from mjchair.report.forces import Array, WheelForces, round_up, wheel_forces
 from mjchair.report.notes import add_title_and_note
 from mjchair.simulation.recording import Recording

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from mjchair.report.colours import MEASURED, SIDES
+from mjchair.report.figure import Figure
 from mjchair.report.forces import Array
 from mjchair.report.notes import add_title_and_note
 from mjchair.simulation.names import same

@@ -5,11 +5,11 @@ In: a diagnosis. Out: bars of size, of gain on runs left out and of likeness to 
 
 from __future__ import annotations
 
-from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, MaxNLocator
 
 from mjchair.diagnosis.result import Candidate, Diagnosis
 from mjchair.report.colours import AFTER, FAINT
+from mjchair.report.figure import Figure
 
 MOST = 12  # effects that are drawn
 LOSS = 0.5  # of the largest gain, at which bars of losses are cut

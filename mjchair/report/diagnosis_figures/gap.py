@@ -6,11 +6,11 @@ In: a diagnosis. Out: a figure with a row a trial.
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from mjchair.diagnosis.result import Diagnosis
 from mjchair.report.colours import AFTER, BEFORE
 from mjchair.report.diagnosis_figures.factor_axis import write_factors
+from mjchair.report.figure import Figure
 
 WIDE = 12.0  # largest over smallest value, beyond which the axis goes by factors
 

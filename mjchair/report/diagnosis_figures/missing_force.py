@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.result import Diagnosis, ForceLevels, ForceSamples
 from mjchair.report.colours import AXIS_LINE, BEFORE
 from mjchair.report.diagnosis_words import TURNING
+from mjchair.report.figure import Figure
 
 CAPTION = (
     "Mean force that the runs ask for at each level, with its standard error; the levels of a "

@@ -7,11 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from matplotlib.figure import Figure
-
 from mjchair.diagnosis.result import Diagnosis
 from mjchair.report.colours import AFTER, FAINT
 from mjchair.report.diagnosis_words import hypothesis_words
+from mjchair.report.figure import Figure
 
 MOST = 8  # bars; the rest is one more
 LEAST = 0.005  # a probability below this has no bar of its own

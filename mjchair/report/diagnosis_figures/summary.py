@@ -7,12 +7,12 @@ bars of what the chairs leave against the noise.
 from __future__ import annotations
 
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from mjchair.diagnosis.result import Diagnosis
 from mjchair.report.colours import AFTER, BEFORE
 from mjchair.report.diagnosis_figures.whole_runs import draw_run, telling
 from mjchair.report.diagnosis_words import size
+from mjchair.report.figure import Figure
 
 PLATE = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}  # behind a number
 

@@ -10,12 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mjchair.diagnosis.result import Diagnosis, TrialGap, WindowGaps
 from mjchair.report.colours import SIZES
 from mjchair.report.diagnosis_figures.factor_axis import write_factors
+from mjchair.report.figure import Figure
 
 Array = NDArray[np.float64]
 

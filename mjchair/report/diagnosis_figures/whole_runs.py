@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mjchair.diagnosis.result import Diagnosis, WholeRun
 from mjchair.report.colours import AFTER, BEFORE, MEASURED
+from mjchair.report.figure import Figure
 
 Array = NDArray[np.float64]
 

@@ -81,7 +81,8 @@ class Replay:
         text = html.escape(self.html).replace("=", "&#61;").replace("://", ":&#47;/")
         return (
             f'<iframe class="replay" title="Replay" srcdoc="{text}" '
-            f'style="width:100%;height:{height}px;border:1px solid #ccc"></iframe>'
+            f'style="width:100%;box-sizing:border-box;height:{height}px;border:1px solid #ccc">'
+            "</iframe>"
         )
 
     def _repr_html_(self) -> str:
