@@ -342,6 +342,56 @@ def rendering() -> list[Line]:
     ]
 
 
+REPLAYED = """(async () => {
+  await mjchair.ready;
+  const scene = document.getElementById("scene"), gl = scene.getContext("webgl2");
+  const pixel = new Uint8Array(4);
+  const drawn = () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);  // waits
+  let at = 0;
+  const pictures = (count) => {
+    const begin = performance.now();
+    for (let k = 0; k < count; k++) mjchair.seek((at = (at + 1 / 60) % 12));
+    return (performance.now() - begin) / count;
+  };
+  const best = { script: Infinity, calls: Infinity, software: Infinity };
+  for (let turn = 0; turn < 15; turn++) {
+    scene.style.display = "none";  // a picture of no size is not drawn
+    best.script = Math.min(best.script, pictures(60));
+    scene.style.display = "";
+    pictures(1); drawn();
+    const begin = performance.now();
+    best.calls = Math.min(best.calls, pictures(1)); drawn();
+    best.software = Math.min(best.software, performance.now() - begin);
+  }
+  return best;
+})()"""
+
+
+def replays() -> list[Line]:
+    """Milliseconds for a picture of a replay that plays, in a browser without a graphics card.
+
+    Script is what the page computes for a picture: poses, arrows, forces, diagrams; then with the
+    calls that hand it to the graphics; then with the wait for a picture that software draws.
+    """
+    sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+    from browser import Page, program
+
+    if program() is None:
+        return [Line("a picture of a replay", "not measured", "", "no Chromium here")]
+    pushes = mjchair.push_strokes({"left_wheel": 16.0, "right_wheel": 13.0}, duration=12.0)
+    run = mjchair.simulate(mjchair.load_spec(), pushes, initial={"speed": 0.7}, sample_rate=250.0)
+    with tempfile.TemporaryDirectory() as folder:
+        run.replay({"ghost": run}).save(Path(folder) / "run.html")
+        with Page(Path(folder) / "run.html", 1280, 800) as page:
+            found = page.value(REPLAYED)
+    reach = f"<= {1e3 / 60:.1f} ms"
+    return [
+        Line("script of a picture of a replay, with a ghost", f"{found['script']:.2f} ms", reach),
+        Line("the same with the calls that draw it", f"{found['calls']:.2f} ms", reach),
+        Line("the same, drawn by software, 1216 x 456", f"{found['software']:.0f} ms"),
+    ]
+
+
 def per_second(picture: Callable[[int], object], count: int) -> float:
     """How often a second `picture` draws; the first call is not counted."""
     picture(0)
@@ -550,6 +600,7 @@ PARTS: dict[str, Callable[[], list[Line]]] = {
     "batch": batches,
     "tasks": environments,
     "render": rendering,
+    "replay": replays,
     "sweep": sweeps,
     "crowd": crowds,
     "hfield": fields,

@@ -103,7 +103,9 @@ def commands_page() -> str:
     told = ["# Command line\n"]
     told.append(
         "Exit code 0 on success, 2 on bad input with one line on standard error. `--traceback` "
-        "before the command shows where an error comes from, `--version` the version.\n"
+        "before the command shows where an error comes from, `--version` the version. "
+        '`eval "$(register-python-argcomplete mjchair)"` completes commands and names in bash '
+        "and zsh.\n"
     )
     for name, parser in completion.commands(cli.parser()).items():
         told += [f"## mjchair {name}\n", f"{_text(parser.description)}\n"]

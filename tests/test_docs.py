@@ -8,6 +8,7 @@ runs what they do. NOT_RUN are those that are no commands of mjchair's.
 from __future__ import annotations
 
 import importlib.util
+import inspect
 import json
 import re
 import sys
@@ -155,12 +156,12 @@ def test_there_are_five_notebooks_and_the_site_has_all_pages():
 # ---- the reference, made from the code ---------------------------------------------------------
 
 
-def reference():
-    """scripts/site_reference.py."""
-    path = ROOT / "scripts" / "site_reference.py"
-    spec = importlib.util.spec_from_file_location("site_reference", path)
+def reference(name="site_reference"):
+    """A script of the site."""
+    path = ROOT / "scripts" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(spec)
-    sys.modules["site_reference"] = module
+    sys.modules[name] = module
     spec.loader.exec_module(module)
     return module
 
@@ -198,6 +199,22 @@ def test_the_reference_has_every_public_name(made):
     assert set(made) == set(GENERATED_PAGES)
     for name in mjchair.__all__:
         assert name == "__version__" or f"mjchair.{name}\n" in page, name
+
+
+def test_the_reference_lists_every_argument_on_a_line_of_its_own():
+    """Docstrings name several on a line; a table of the site would have the first of them only."""
+    import mjchair
+
+    pytest.importorskip("griffe", reason="make docs installs what reads docstrings")
+    split = reference("site_arguments").split
+    functions = [v for n in mjchair.__all__ if inspect.isfunction(v := getattr(mjchair, n))]
+    told = [f for f in functions if "Args:" in (f.__doc__ or "")]
+    assert len(told) > 5
+    for function in [*told, mjchair.ChairParameters]:
+        lines = split(inspect.cleandoc(function.__doc__)).splitlines()
+        listed = {m[1] for line in lines if (m := re.match(r"  (\w+): ", line))}
+        missing = set(inspect.signature(function).parameters) - listed - {"options"}
+        assert not missing, f"{function.__name__}: {missing}"
 
 
 def test_the_site_is_made_without_a_warning():
