@@ -16,6 +16,7 @@ from mjchair.report.figure_file import save
 from mjchair.report.trajectory import trajectory
 from mjchair.report.wheel_speed import wheel_speed
 
+PNG = b"\x89PNG"
 NOTE = "A sentence of the length that the demonstration has, with what was assumed. " * 4
 
 
@@ -29,6 +30,10 @@ def run():
 @pytest.fixture(scope="module")
 def rest():
     return mjchair.simulate(mjchair.load_spec("manual"), None, 0.3)
+
+
+def test_a_figure_shows_itself_in_a_notebook(run):
+    assert trajectory(run)._repr_png_().startswith(PNG)
 
 
 def with_force(run, channel, value, where=slice(None)):
