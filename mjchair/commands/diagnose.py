@@ -1,4 +1,8 @@
-"""`mjchair diagnose`: measured runs in, a verdict, a report and a corrected chair out."""
+"""`mjchair diagnose`: measured runs in, a verdict, a report and a corrected chair out.
+
+In: a study folder (study.toml and its tables), and effects of the user's own. Out, in --out:
+diagnosis.json, report.html, figures, and model.xml, the corrected chair.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""`mjchair fit-tire`: coefficients from a rig table, with what the data cannot determine said."""
+"""`mjchair fit-tire`: coefficients from a rig table, with what the data cannot determine said.
+
+In: a CSV table of rig runs and the name of a formula family. Out, in --out: the tire as TOML or
+.tir, fit.txt, fit.json and fit.png.
+"""
 
 from __future__ import annotations
 

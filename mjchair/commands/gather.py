@@ -1,4 +1,8 @@
-"""`mjchair gather`: a folder of instruments' files in, a study folder out."""
+"""`mjchair gather`: a folder of instruments' files in, a study folder out.
+
+In: a folder of files of SmartWheel, inertial sensors and others. Out: a study folder for
+`mjchair diagnose`, and a figure of what was found.
+"""
 
 from __future__ import annotations
 

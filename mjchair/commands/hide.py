@@ -1,4 +1,8 @@
-"""`mjchair hide`: a practice study with an effect hidden in it, the answer sealed beside it."""
+"""`mjchair hide`: a practice study with an effect hidden in it, the answer sealed beside it.
+
+In: an effect, its values, and a chair. Out: a study folder of simulated runs, with the sealed
+answer; or, with --reveal, the answer of such a folder on standard output.
+"""
 
 from __future__ import annotations
 

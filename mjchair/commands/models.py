@@ -1,4 +1,7 @@
-"""`mjchair models`: the chairs, scenes and tires that ship, with units and sources."""
+"""`mjchair models`: the chairs, scenes and tires that ship, with units and sources.
+
+In: nothing, or the name of a tire or a chair. Out: text on standard output.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""`mjchair outcomes`: push time, cadence, moment, power and the like, a row a stroke."""
+"""`mjchair outcomes`: push time, cadence, moment, power and the like, a row a stroke.
+
+In: a SmartWheel file, a study table or a recording. Out: a table on standard output, and as CSV.
+"""
 
 from __future__ import annotations
 

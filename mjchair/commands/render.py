@@ -1,4 +1,7 @@
-"""`mjchair render`: a film or a frame of a saved recording, without simulating again."""
+"""`mjchair render`: a film or a frame of a saved recording, without simulating again.
+
+In: recording.npz, or its folder. Out: an MP4 film, or a PNG picture of one moment.
+"""
 
 from __future__ import annotations
 

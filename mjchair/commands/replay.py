@@ -1,4 +1,7 @@
-"""`mjchair replay`: a saved recording in three dimensions, as one page that opens offline."""
+"""`mjchair replay`: a saved recording in three dimensions, as one page that opens offline.
+
+In: recording.npz, or its folder, and other runs to compare with. Out: one HTML file.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""`mjchair rider`: markers of a person in a chair in, angles of the rider's joints out."""
+"""`mjchair rider`: markers of a person in a chair in, angles of the rider's joints out.
+
+In: a C3D or TRC file of markers. Out: a CSV table of joint angles for `mjchair simulate --input`,
+and a film with the markers.
+"""
 
 from __future__ import annotations
 

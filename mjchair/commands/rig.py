@@ -1,4 +1,8 @@
-"""`mjchair rig`: the paper's experiment, a wheel on a sliding table with load cells."""
+"""`mjchair rig`: the paper's experiment, a wheel on a sliding table with load cells.
+
+In: a tire, and slip angles, loads, speeds and cambers. Out, in --out: a CSV table with a row for
+each point, traces and figures.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""`mjchair simulate`: any chair, scene, tire and input to a recording, a CSV and figures."""
+"""`mjchair simulate`: any chair, scene, tire and input to a recording, a CSV and figures.
+
+In: the options of the command line. Out, in --out: recording.npz, recording.csv, figures and, with
+--video, a film.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""`mjchair sweep`: many chairs over parameters, inputs and seeds."""
+"""`mjchair sweep`: many chairs over parameters, inputs and seeds.
+
+In: a TOML file of a sweep. Out, in --out: a Parquet dataset with a row for each chair.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""`mjchair test`: the test laboratory on any chair; numbers, classes and a sheet."""
+"""`mjchair test`: the test laboratory on any chair; numbers, classes and a sheet.
+
+In: a chair, a dummy's mass, names of tests, and parameters to compare. Out, in --out: results.json,
+the sheet as HTML and, if asked for, films and replays.
+"""
 
 from __future__ import annotations
 

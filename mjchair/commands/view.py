@@ -1,4 +1,7 @@
-"""`mjchair view`: a chair in MuJoCo's own viewer, tires on."""
+"""`mjchair view`: a chair in MuJoCo's own viewer, tires on.
+
+In: a chair and a scene. Out: a window, until it is closed.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,9 @@
-"""What a diagnosis says, typed: the verdict, what it rests on, and what a report draws.
+"""Types of the result of a diagnosis: the verdict, its reasons, and the arrays of the figures.
 
-`Diagnosis.to_dict` is what the file diagnosis.json holds and more. `Evidence` holds arrays ready to
-be drawn: whoever draws simulates nothing.
+In: nothing; mjchair.diagnosis.diagnose fills these types. Out: `Diagnosis` and its parts.
+
+`Diagnosis.to_dict` has all that the file diagnosis.json has, and more. `Evidence` has the arrays
+that reports draw, so that a report simulates nothing.
 """
 
 from __future__ import annotations

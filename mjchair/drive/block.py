@@ -1,5 +1,7 @@
 """Where the numbers of a drive lie: in `user` fields, in the activation, and in the sensors.
 
+In: nothing. Out: the index of each number, and the names of the parts.
+
 A drive is five actuators that stand next to one another in the model, in this order:
 
     joystick_x, joystick_y   inputs, -1 to 1; without a force

@@ -1,4 +1,7 @@
-"""MuJoCo's own warnings, unheard: a chair that fails in a search is dropped and noted instead."""
+"""Silence MuJoCo's own warnings, where a chair that fails in a search is dropped and noted.
+
+In: a block of code. Out: the block runs without MuJoCo's warnings on the terminal or in a file.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Many simulations at once through `mujoco.batch`: models, states and inputs in, records out.
+"""Many simulations at once through `mujoco.batch`.
+
+In: models, first states and inputs. Out: records of each simulation, and whether it diverged.
 
 Sweeps and the diagnosis use this module. A simulation gives the same result in a batch as alone, to
 the bit, so the result depends neither on the other simulations of the batch nor on the number of

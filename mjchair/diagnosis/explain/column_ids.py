@@ -1,4 +1,6 @@
-"""Identifiers of the columns that explain: effects that might be there, and forces with a driver.
+"""Identifiers of the columns of effects, and of forces with a driver, that are tested.
+
+In: nothing. Out: types that name a column or a group of columns of the linear system.
 
 Columns of one group are tested together: a start of one effect, or one force with one driver.
 """

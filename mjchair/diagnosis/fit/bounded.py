@@ -1,5 +1,8 @@
 """The bounded linear fit: coefficients of a system, its nuisances between their walls.
 
+In: a `System` and the windows that count. Out: coefficients, chi2, and `Reduced`, from which the
+gain of any choice of effects follows.
+
 Nuisances are eliminated from the sums over windows; those that would pass their wall are held on
 it. What is left (`Reduced`) weighs effects by small linear algebra alone.
 """

@@ -1,7 +1,10 @@
-"""Identifiers of the columns of a linear system, in place of names that have to be taken apart.
+"""Identifiers of the columns of a linear system.
 
-A column is how every prediction answers to one thing: something only roughly known, a parameter of
-an effect that is in, or (in the room `explain`) an effect or a force that might be there.
+In: nothing. Out: types that name a column of the linear system.
+
+A column is the derivative of every prediction by one thing: something only roughly known, a
+parameter of an effect that is in the chair, or (mjchair.diagnosis.explain) an effect or a
+force to be tested.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
-"""Elimination of what a window is free to start from, and of what shakes the chair in it.
+"""Elimination of the free first state of a window, and of the disturbances in it.
 
-A window's residual r, the columns J that are asked about, and the columns Z of its own state and of
+In: the white residual and columns of a window. Out: `Eliminated`, the products that later
+fits need.
+
+A window's residual r, the columns J that are asked for, and the columns Z of its own state and of
 its disturbances are white. Z is fitted away under its prior; left are the products of J with itself
 and with r, which are all that later fits need.
 """

@@ -1,7 +1,10 @@
-"""The slow part of a window's residual, channel by channel: where chairs move and noise is small.
+"""Chi2 of the slow part of a window's residual, for each channel: chairs move slowly.
 
-Below BAND a residual is told by a few cosines a channel; their sum of squares against its degrees
-of freedom says whether one channel of one window shows more than noise.
+In: a window after elimination, and the rows of its slow cosines. Out: `Cells`, chi2 and degrees of
+freedom of each channel.
+
+Below BAND a few cosines describe the residual of a channel. Their sum of squares, compared with its
+degrees of freedom, shows whether one channel of one window has more than noise.
 """
 
 from __future__ import annotations

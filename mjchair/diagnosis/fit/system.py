@@ -1,7 +1,9 @@
 """All windows as linear algebra around one chair: products of white columns, window by window.
 
-What is left of a window is small: the products of its columns with one another and with the
-residual. Every test, fit and score after that is made of sums of those (bounded.py).
+In: the columns of every window of a chair. Out: `System`, the products of each window.
+
+Only little is kept of a window: the products of its columns with one another and with the
+residual. Every later test, fit and score is made of sums of these (bounded.py).
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 
 In: manoeuvres rehearsed with the chosen chair, and the fit of a rival. Each manoeuvre is one more
 window of the linear system around the rival; the difference that the rival makes is its residual.
+
+Out: T, the least chi2 by which the two explanations differ.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Motions that were measured beside the channels, such as `rider_motion`: smoothed, at any time.
+"""Smoothed motions that were measured besides the channels, such as `rider_motion`.
+
+In: a measured run. Out: `Motion` by name: place and speed at any time.
 
 A column of a table that is neither sensor nor input is a motion (m). Where a model has an actuator
 of the column's name, that follows it; a joint of the name starts at its place and speed.

@@ -1,7 +1,10 @@
-"""One model's state in another model that shares some of its joints and actuators.
+"""Transfer of a state to another model that shares some of the joints and actuators.
+
+In: two compiled models. Out: `Transfer`, which makes states of one of them from states
+of the other.
 
 An effect may add joints (a rider that moves) or activations (a drive that lags). What both models
-have is carried over by name; the rest stands as the other model has it at first.
+have is copied by name; the rest has its first value of the other model.
 """
 
 from __future__ import annotations
