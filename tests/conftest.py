@@ -43,6 +43,13 @@ def has_graphics() -> bool:
     return True
 
 
+@pytest.fixture(scope="session", autouse=True)
+def compiled_tires():
+    """The tires are compiled before the first test, or the line that says so is a test's output."""
+    mjchair.install()
+    mjchair.uninstall()
+
+
 @pytest.fixture(autouse=True)
 def no_callbacks_leak():
     """Every test starts and ends without callbacks."""
