@@ -1,20 +1,28 @@
 """A motion that is known, seen by markers, comes back; bad files get one line."""
 
+from dataclasses import replace
+
 import ezc3d
+import imageio_ffmpeg
 import mujoco
 import numpy as np
 import pytest
+from conftest import has_graphics
 
 import mjchair
 from mjchair.cli import main
 from mjchair.errors import MjchairError
 from mjchair.measurement.markers import Markers, read_markers
+from mjchair.motion import inverse_kinematics
 from mjchair.motion.capture import captured
 from mjchair.motion.chair_frame import bridged, in_chair
+from mjchair.motion.inverse_kinematics import Build
 from mjchair.motion.marker_set import find_marker_set, read_marker_set
+from mjchair.report.marker_film import MarkerFilm, write_marker_film
 from mjchair.rider.anatomy import JOINTS
 from mjchair.rider.rider import Rider
 
+drawn = pytest.mark.skipif(not has_graphics(), reason="no offscreen OpenGL on this machine")
 RATE, FRAMES = 50.0, 40
 PELVIS = {"LASI": (0.1, 0.12), "RASI": (0.1, -0.12), "LPSI": (-0.1, 0.05), "RPSI": (-0.1, -0.05)}
 MOVES = {  # joint -> rad about the chair's posture
@@ -113,6 +121,41 @@ def test_forward_is_the_way_rolled_not_where_the_run_ends(truth):
     seen = np.isfinite(placed.positions)
     off = placed_turned.positions[seen] - placed.positions[seen]
     assert np.abs(off).max() < 1e-9
+
+
+def test_a_length_that_the_static_trial_does_not_tell_comes_from_the_run(truth):
+    names, run, _ = truth
+    chosen = read_marker_set("plug_in_gait")
+    still = run.copy()
+    still[:, names.index("LSHO")] = np.nan
+    rider, _ = inverse_kinematics._rider([still, run], tuple(names), chosen, Build())
+    assert {"left_upper_arm", "right_upper_arm"} <= set(rider.lengths)
+    blind = run.copy()
+    blind[:, [names.index(name) for name in ("LELB", "RELB")]] = np.nan
+    rider, notes = inverse_kinematics._rider([blind], tuple(names), chosen, Build())
+    assert (
+        not rider.lengths and "none measured, since no trial has markers at both ends" in notes[0]
+    )
+
+
+@drawn
+def test_a_film_has_a_ball_at_every_marker_that_is_seen(motion, tmp_path):
+    def picture(placed):
+        with MarkerFilm(replace(motion, placed=placed), 320, 180) as film:
+            return film.frame(0).astype(int)
+
+    nothing = np.full_like(motion.placed, np.nan)
+    one = nothing.copy()
+    one[:, 0] = (0.15, 0.0, 1.3)  # over the head, which hides no ball there
+    red, green, blue = picture(one)[np.abs(picture(one) - picture(nothing)).max(axis=2) > 30].T
+    ball = (red > 1.5 * green) & (green > blue)
+    assert 3 < ball.sum() < 100, "one small ball of orange"
+    path = tmp_path / "rider.mp4"
+    short = replace(motion, time=motion.time[:7], placed=motion.placed[:7], qpos=motion.qpos[:7])
+    write_marker_film(short, path)
+    assert imageio_ffmpeg.count_frames_and_secs(str(path))[0] == 3  # 50 Hz filmed at 15
+    with pytest.raises(MjchairError, match=r"written as \.mp4"):
+        write_marker_film(short, tmp_path / "rider.avi")
 
 
 def test_short_gaps_are_bridged_and_long_ones_left_empty(motion):

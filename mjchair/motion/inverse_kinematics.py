@@ -4,15 +4,16 @@ In: markers relative to the chair (n, m, 3), and what they are. Out: a `Motion`:
 rider's joints frame by frame, empty where no marker tells them, the lengths of the segments, and
 how far each marker is from where the rider has it.
 
-Segment lengths come from the markers (of a static trial, if there is one). Then two steps take
-turns: each frame's angles by bounded least squares (mujoco.minimize), within what a body reaches;
-and the place of every marker on its segment, and of the chair's origin, by the mean of what is
-left. A marker on a landmark stays near it; one of a cluster goes where the data put it.
+Segment lengths come from the markers: of a static trial where it tells them, or else of the run.
+Then two steps take turns: each frame's angles by bounded least squares (mujoco.minimize), within
+what a body reaches; and the place of every marker on its segment, and of the chair's origin, by the
+mean of what is left. A marker on a landmark stays near it; one of a cluster goes where the data put
+it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -44,6 +45,10 @@ LENGTHS = {  # segment -> pairs of landmarks along it
     ),
 }
 BUILD = (0.7, 1.4)  # shares of the usual length between which a measured one is believed
+NO_LENGTHS = (
+    "none measured, since no trial has markers at both ends of an upper arm (acromion, lateral "
+    "epicondyle) or of a forearm (lateral epicondyle, a styloid or the wrist)"
+)
 WORST = 0.08  # m rms over all markers, beyond which these are no markers of this person
 
 
@@ -111,11 +116,11 @@ def lengths_of(placed: Array, names: tuple[str, ...], chosen: MarkerSet) -> dict
                 if not all(end in where for end in ends):
                     continue
                 between = placed[:, where[ends[0]]] - placed[:, where[ends[1]]]
+                if not np.isfinite(between).any():
+                    continue
                 apart = float(np.nanmedian(np.linalg.norm(between, axis=1)))
                 usual = [data.site(PREFIX + end).xpos for end in ends]
                 ratio = apart / float(np.linalg.norm(usual[0] - usual[1]))
-                if not np.isfinite(ratio):
-                    continue
                 if not BUILD[0] < ratio < BUILD[1]:
                     raise MjchairError(
                         f"{ends[0]} and {ends[1]} are {apart:.3f} m apart, "
@@ -140,7 +145,8 @@ def fit(
     Args:
       time: (n,), s. placed: (n, m, 3), m, from `chair_frame.in_chair`. names: m of them.
       chosen: what they are, in those names. build: whose. static: (k, m, 3), of a trial at rest,
-        for lengths and places; None: from the run itself. say: called with what is under way.
+        for lengths and places; None, or a length that it does not tell: from the run itself.
+      say: called with what is under way.
 
     Raises:
       MjchairError: too few markers, lengths that no person has, markers that fit no person.
@@ -156,7 +162,7 @@ def fit(
     kept = tuple(names[i] for i in used)
     run = placed[:, used]
     still = None if static is None else static[:, used]
-    rider, notes = _rider(still if still is not None else run, kept, chosen, build)
+    rider, notes = _rider([run] if still is None else [still, run], kept, chosen, build)
     if missing:
         notes.append(f"never seen, left out: {', '.join(missing)}")
     model = _model(build, rider)
@@ -171,9 +177,12 @@ def fit(
 
 
 def _rider(
-    run: Array, names: tuple[str, ...], chosen: MarkerSet, build: Build
+    trials: Sequence[Array], names: tuple[str, ...], chosen: MarkerSet, build: Build
 ) -> tuple[Rider, list[str]]:
-    ratios = lengths_of(run, names, _only(chosen, names))
+    """The build from the first of the trials that tells a length, and lines on it."""
+    ratios: dict[str, float] = {}
+    for trial in reversed(trials):
+        ratios |= lengths_of(trial, names, _only(chosen, names))
     stature = build.stature
     if stature is None:
         arms = [ratio for name, ratio in ratios.items() if name.endswith(("upper_arm", "forearm"))]
@@ -183,7 +192,7 @@ def _rider(
     for name, ratio in ratios.items():
         shape = _length(base, name) * 1.75 / stature
         lengths[name] = float(f"{shape * ratio:.4f}")
-    said = ", ".join(f"{name} {value:.3f} m" for name, value in lengths.items()) or "none measured"
+    said = ", ".join(f"{name} {value:.3f} m" for name, value in lengths.items()) or NO_LENGTHS
     origin = "given" if build.stature is not None else "from the arms" if ratios else "assumed"
     notes = [f"lengths: {said}; stature {stature:.2f} m ({origin})"]
     return Rider(stature=stature, lengths=lengths), notes
