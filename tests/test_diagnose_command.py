@@ -189,7 +189,6 @@ def test_bad_arguments_are_one_line_and_nothing_is_written(done, tmp_path, capsy
     out = tmp_path / "out"
     for arguments in (
         ["diagnose", str(tmp_path / "nowhere"), "--out", str(out)],
-        ["diagnose", str(done[0]), "--out", str(out), "--threads", "0"],
         ["diagnose", str(done[0]), "--out", str(out), "--effect", str(tmp_path / "mine.py")],
         ["hide", "--out", str(out)],
         ["hide", "rolling_resistence", "--out", str(out)],
@@ -202,6 +201,9 @@ def test_bad_arguments_are_one_line_and_nothing_is_written(done, tmp_path, capsy
         assert cli.main(arguments) == 2, arguments
         assert one_line(capsys)
         assert not out.exists(), arguments
+    with pytest.raises(SystemExit):
+        cli.main(["diagnose", str(done[0]), "--out", str(out), "--threads", "-1"])
+    assert "0 for all processors" in one_line(capsys) and not out.exists()
 
 
 # a diagnosis that sends itself a signal as soon as it has kept so many simulations

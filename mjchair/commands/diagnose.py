@@ -59,7 +59,9 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
         default=[],
         help="an effect of your own, see docs/diagnosis.md",
     )
-    parser.add_argument("--threads", type=int, default=2, help="default: %(default)s")
+    parser.add_argument(
+        "--threads", type=options.processors, default=0, help="default: all processors"
+    )
     options.add_output(parser, "out/diagnose")
     parser.set_defaults(run=run)
 
@@ -72,8 +74,6 @@ def run(args: argparse.Namespace) -> int:
     from mjchair.effects import user_file
     from mjchair.storage import check_vacant, output_folder
 
-    if args.threads < 1:
-        raise MjchairError(f"--threads is {args.threads}; it must be at least 1")
     kept = Path(args.out) / CACHE
     force = args.force or _interrupted(kept)
     check_vacant(args.out, force)

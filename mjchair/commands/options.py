@@ -159,6 +159,15 @@ def chair(args: argparse.Namespace, **more: Any) -> mujoco.MjSpec:
     )
 
 
+def processors(text: str) -> int:
+    """How many threads or processes, as the type of an option; 0: one for each processor."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a whole number; give 1 or more, or 0 for all processors"
+        )
+    return int(text)
+
+
 def number(text: str) -> float:
     """A finite number, as the type of an option."""
     try:

@@ -25,7 +25,9 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
         "--out as they finish; the same command goes on with an interrupted sweep.",
     )
     parser.add_argument("study", help="TOML file")
-    parser.add_argument("--threads", type=int, default=0, help="default: all processors")
+    parser.add_argument(
+        "--threads", type=options.processors, default=0, help="default: all processors"
+    )
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="of a Dask scheduler, such as tcp://host:8786"
     )

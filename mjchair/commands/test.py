@@ -73,7 +73,9 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
     parser.add_argument(
         "--no-stops", action="store_true", help="tilting platform without stops: the tires hold"
     )
-    parser.add_argument("--workers", type=int, default=0, help="default: all processors")
+    parser.add_argument(
+        "--workers", type=options.processors, default=0, help="default: all processors"
+    )
     options.add_output(parser, "out/test")
     parser.set_defaults(run=run)
 

@@ -17,7 +17,6 @@ from mjchair.diagnosis.explain.screening import Say, gap_after, prepare, screen_
 from mjchair.diagnosis.explain.search import choose
 from mjchair.diagnosis.replay import strokes
 from mjchair.diagnosis.replay.cache import Store
-from mjchair.diagnosis.replay.simulator import THREADS
 from mjchair.diagnosis.result import Diagnosis
 from mjchair.effects.effect import Effect
 from mjchair.effects.library import library
@@ -44,7 +43,7 @@ def diagnose(
     effects: Sequence[Effect] = (),
     say: Say = silent,
     store: Store | None = None,
-    threads: int = THREADS,
+    threads: int = 0,
 ) -> Diagnosis:
     """Find where model and measurement disagree, and name the effect that is missing.
 
@@ -53,7 +52,7 @@ def diagnose(
       effects: of your own, besides the library's.
       say: is called with the name of every stage as it begins.
       store: keeps simulations, so that a second start goes on from an interrupted one.
-      threads: that simulate.
+      threads: that simulate; 0: all processors. The result does not depend on their number.
 
     Raises:
       MjchairError: a study that cannot be read or simulated, as one line.

@@ -29,7 +29,7 @@ from mjchair.diagnosis.replay import noise, noise_left
 from mjchair.diagnosis.replay.cache import Store
 from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.pulses import pulse_answers, pulses
-from mjchair.diagnosis.replay.simulator import THREADS, WindowSimulator
+from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.diagnosis.replay.window_states import Track, track
 from mjchair.effects.effect import Effect
 
@@ -68,7 +68,7 @@ def silent(_: str) -> None:
 
 
 def prepare(
-    study: Study, say: Say = silent, store: Store | None = None, threads: int = THREADS
+    study: Study, say: Say = silent, store: Store | None = None, threads: int = 0
 ) -> tuple[Bench, Track]:
     """Windows, their states, the noise, and what is only roughly known."""
     study = with_copied_wheels(study)

@@ -30,7 +30,6 @@ from mjchair.simulation import batch, names
 
 Array = NDArray[np.float64]
 FORCE = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
-THREADS = 2
 
 
 @dataclass
@@ -69,7 +68,7 @@ class WindowSimulator:
         study: Study,
         windows: Sequence[Window] | None = None,
         store: Store | None = None,
-        threads: int = THREADS,
+        threads: int = 0,
     ) -> None:
         """Cut the runs; simulations are kept in the store, where there is one."""
         self.store = store
