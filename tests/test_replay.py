@@ -370,7 +370,9 @@ def test_a_truncated_or_broken_recording_is_one_line(other, tmp_path, capsys):
 
 def test_positions_of_another_model_are_refused(other, tmp_path, capsys):
     path = damaged(other, tmp_path / "recording.npz", qpos=other.qpos[:, :-1])
-    assert "positions" in refused(path, capsys)
+    assert "its model" in refused(path, capsys)
+    path = damaged(other, tmp_path / "recording.npz", qpos=other.qpos * np.nan)
+    assert "not numbers" in refused(path, capsys)
 
 
 def test_a_model_without_its_meshes_is_one_line(other, tmp_path, capsys):

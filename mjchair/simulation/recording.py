@@ -278,7 +278,14 @@ def load_recording(path: str | os.PathLike[str]) -> Recording:
         with np.load(path, allow_pickle=False) as file:
             header = json.loads(str(file["header"]))
             arrays = {name: file[name] for name in file.files if name != "header"}
+    except BROKEN:
+        raise MjchairError(
+            f"{path} is not an mjchair recording: it is cut off, damaged, or another kind of file"
+        ) from None
+    try:
         return _from_parts(header, arrays)
+    except KeyError as error:
+        raise MjchairError(f"{path} is not an mjchair recording: it has no {error}") from None
     except BROKEN as error:
         line = (str(error) or type(error).__name__).splitlines()[0]
         raise MjchairError(f"{path} is not an mjchair recording: {line}") from None

@@ -49,7 +49,7 @@ GHOSTS = (colours.BEFORE, colours.MEASURED, "#009e73", "#cc79a7")
 BODY = colours.AFTER
 FIRST_SHOWN = 3  # diagrams that are open at first
 NO_FORCE = "no tire has a force in this run, so there are no arrows"
-HEIGHT = 720  # pixels, of a frame in a notebook or a report
+HEIGHT = 840  # pixels, of a frame in a notebook or a report
 
 Shown = Recording | Trial
 

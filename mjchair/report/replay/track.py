@@ -92,6 +92,8 @@ def track(recording: Recording, label: str = "", most: int = MOST) -> Track:
             f"the recording has {recording.qpos.shape[1]} positions and its model {model.nq}; "
             "it is damaged"
         )
+    if not np.isfinite(recording.qpos).all():
+        raise MjchairError("the recording has positions that are not numbers; it is damaged")
     looked_at = evenly(recording.time, min(EVERY, recording.time.size))
     places, quaternions = poses(model, recording.qpos[looked_at])
     chosen = _chosen(recording.time[looked_at], places, quaternions, most)

@@ -457,9 +457,9 @@
   const short = (value) => (!Number.isFinite(value) ? "–"
     : value && Math.abs(value) < 1e-3 ? (+value.toPrecision(2)).toExponential() : String(+value.toPrecision(4)));
 
-  // Values at which lines of a diagram are drawn: about three, at round numbers.
-  function rounds(low, high) {
-    const rough = (high - low) / 3, power = 10 ** Math.floor(Math.log10(rough));
+  // Values at which lines of a diagram are drawn: about so many, at round numbers.
+  function rounds(low, high, about = 3) {
+    const rough = 0.999 * (high - low) / about, power = 10 ** Math.floor(Math.log10(rough));
     const step = power * [1, 2, 5, 10].find((s) => s * power >= rough);
     const values = [];
     for (let v = Math.ceil(low / step) * step; v <= high; v += step) values.push(+v.toPrecision(10));
@@ -529,7 +529,7 @@
         draw.fillText(short(v), AXIS - 5, y(v));
       }
       draw.textAlign = "center"; draw.textBaseline = "bottom";
-      const seconds = rounds(this.player.begin, this.player.end + 1e-9);
+      const seconds = rounds(this.player.begin, this.player.end + 1e-9, 5);
       for (const t of seconds) draw.fillText(`${short(t)} s`, Math.min(Math.max(x(t), AXIS + 8), width - 18), height);
       for (const line of this.lines) this.drawLine(draw, line, x, y);
     }
