@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import mjchair
+from mjchair.effects.library import names as effect_names
 
 PACKAGE = Path(mjchair.__file__).parent
 
@@ -67,6 +68,7 @@ ROOMS = [
     ("evidence", "material"),
     ("decide",),
     ("diagnose",),
+    ("driven_run",),
 ]
 ROOM_LEVEL = {name: level for level, row in enumerate(ROOMS) for name in row}
 
@@ -100,6 +102,29 @@ def test_data_flows_up_through_the_rooms_of_the_diagnosis(path):
 def test_the_tire_law_knows_no_engine(path):
     if floor(path) in WITHOUT_MUJOCO:
         assert not [name for name in imports(path) if name.split(".")[0] == "mujoco"]
+
+
+SIMULATING = ("simulate", "simulator", "batch")
+
+
+def test_reports_draw_and_do_not_simulate():
+    for path in FILES:
+        if floor(path) == "report":
+            for module in SIMULATING:
+                used = [
+                    n for n in imports(path) if f"{n}.".startswith(f"mjchair.simulation.{module}.")
+                ]
+                assert not used, f"{path.name} simulates: {used}"
+
+
+def test_the_general_machinery_of_the_diagnosis_knows_no_effect_by_name():
+    known = set(effect_names())
+    for path in DIAGNOSIS:
+        tree = ast.parse(path.read_text())
+        texts = {n.value for n in ast.walk(tree) if isinstance(n, ast.Constant)}
+        named = known & {text for text in texts if isinstance(text, str)}
+        modules = {n for n in imports(path) if n.removeprefix("mjchair.effects.") in known}
+        assert not named | modules, f"{path.name} knows {named | modules}"
 
 
 def test_no_drawer_for_odds_and_ends():

@@ -120,7 +120,6 @@ def _write(folder: Path, kept: Path, study: Study, found: Diagnosis) -> None:
     """Make everything first, then write it beside the simulations, then move it, verdict last."""
     from mjchair.diagnosis.diagnose import corrected
     from mjchair.model.spec import compile_spec, exact_xml
-    from mjchair.report import diagnosis_replay
     from mjchair.report.diagnosis_page import figures, page
     from mjchair.storage import write_whole
 
@@ -131,13 +130,23 @@ def _write(folder: Path, kept: Path, study: Study, found: Diagnosis) -> None:
     files: dict[str, str | bytes] = {f"{name}.png": image for name, image in drawn.items()}
     files["model.xml"] = spec.to_xml()
     title = f"Diagnosis of {Path(study.source).resolve().name}"
-    shown = diagnosis_replay.section(study, found)
-    files["report.html"] = page(found, drawn, title, shown)
+    files["report.html"] = page(found, drawn, title, _replay(study, found))
     files["diagnosis.json"] = json.dumps(contract(found), indent=1, allow_nan=False) + "\n"
     for name, content in files.items():
         write_whole(kept / name, content)
     for name in files:
         (kept / name).replace(folder / name)
+
+
+def _replay(study: Study, found: Diagnosis) -> str:
+    """HTML of a run of the study with both chairs; one sentence where no chair can be driven."""
+    from mjchair.diagnosis.driven_run import drive_run
+    from mjchair.report import diagnosis_replay
+
+    try:
+        return diagnosis_replay.section(drive_run(study, found))
+    except MjchairError as error:
+        return diagnosis_replay.no_replay(str(error))
 
 
 def contract(found: Diagnosis) -> dict[str, Any]:

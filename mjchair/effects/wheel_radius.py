@@ -11,8 +11,7 @@ from mjchair.model import edits, parts
 def edit(spec: mujoco.MjSpec, left: float, right: float) -> None:
     """Add `left` and `right` (m) to the radii of the rear wheels; their hubs stay in place."""
     for wheel, change in zip(parts.REAR, (left, right), strict=True):
-        radius = float(parts.tire_geom(spec, wheel).size[0])
-        edits.set_radius(spec, wheel, radius + change)
+        edits.add_radius(spec, wheel, change)
 
 
 EFFECT = Effect(

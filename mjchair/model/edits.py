@@ -87,6 +87,11 @@ def set_radius(spec: mujoco.MjSpec, wheel: str, radius: float) -> float:
     return old
 
 
+def add_radius(spec: mujoco.MjSpec, wheel: str, change: float) -> None:
+    """Make the radius of a wheel larger by `change` (m); its hub stays in place."""
+    set_radius(spec, wheel, float(parts.tire_geom(spec, wheel).size[0]) + change)
+
+
 def add_trail(spec: mujoco.MjSpec, caster: str, length: float) -> None:
     """Move the wheel of a caster back from its stem by `length` (m)."""
     body = parts.named(spec.bodies, caster, "body")

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from mjchair.effects import wheel_radius
 from mjchair.effects.effect import SensorError
 from mjchair.errors import MjchairError, nearest
 from mjchair.measurement.sensors import sensor
-from mjchair.model import inertials, parts
+from mjchair.model import edits, inertials, parts
 from mjchair.tire import block
 
 Edit = Callable[[mujoco.MjSpec, float], None]
@@ -70,7 +69,8 @@ def _centre(axis: int) -> Edit:
 
 def _rolling_radius(spec: mujoco.MjSpec, value: float) -> None:
     """Of both rear wheels together: pressure and load change it, and nobody measures it loaded."""
-    wheel_radius.EFFECT.apply(spec, {"left": value, "right": value})
+    for wheel in parts.REAR:
+        edits.add_radius(spec, wheel, value)
 
 
 def _stiffness(wheels: tuple[str, ...]) -> Edit:

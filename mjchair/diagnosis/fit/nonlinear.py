@@ -2,6 +2,12 @@
 
 In: a variant to begin at. Out: the best one found, with its track, the linear system around it and
 its uncertainties. A fit never returns a variant that is worse than the one that it began at.
+
+Why not `mujoco.minimize.least_squares`: on the same residuals it reaches the same chi2 (within 1.5
+in the seven of eight fits of benchmarks/minimizers.py that converge), but it simulates 1.5 to 5.6
+times as many windows. This fit keeps the columns of the roughly known numbers from where it began;
+the library's differentiates all columns again in each iteration. From a toe that is 0.08 rad off,
+neither converges.
 """
 
 from __future__ import annotations
