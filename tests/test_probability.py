@@ -1,10 +1,14 @@
-"""Probabilities of hypotheses on small systems: they sum to 1 and follow evidence and priors."""
+"""Probabilities of hypotheses follow evidence and priors, and come true as often as they say."""
 
+import math
+import re
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from mjchair.diagnosis.explain import calibration, hypotheses
+from mjchair.diagnosis.explain.calibration import Chosen, Weight
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.column_ids import (
     Driver,
@@ -16,10 +20,14 @@ from mjchair.diagnosis.explain.column_ids import (
 )
 from mjchair.diagnosis.explain.probability import NONE, OUTSIDE, of_effects, probabilities
 from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.column_ids import RoughlyKnown
+from mjchair.diagnosis.fit.process import KINDS
 from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.replay.pulses import Force
 from mjchair.effects.library import find
+from mjchair.errors import MjchairError
 
+COUNT = 120  # drawn studies
 NAMES = ("rolling_resistance", "caster_trail", "caster_friction")
 
 
@@ -58,7 +66,27 @@ def base(size, alike=0.0, force=0.0):
         run=np.zeros(1, int),
         back=np.zeros(0),
     )
-    return SimpleNamespace(reduced=bounded.reduce(system, [0]), starts=starts)
+    reduced = bounded.reduce(system, [0])
+    plain = SimpleNamespace(total=reduced.total)
+    return SimpleNamespace(reduced=reduced, starts=starts, plain=plain)
+
+
+def fit(known, one):
+    """One effect with its fit."""
+    hypothesis = hypotheses.weigh(known.reduced, [one])
+    fitted = SimpleNamespace(total=known.plain.total - hypothesis.gain)
+    return SimpleNamespace(hypothesis=hypothesis, fitted=fitted)
+
+
+def chosen(known, name, rivals=()):
+    """The choice of one effect, which leaves no gap; every effect was fitted."""
+    fits = {s.effect.name: fit(known, s) for s in known.starts}
+    return SimpleNamespace(
+        **vars(fits[name]),
+        tried=list(fits.values()),
+        after=[SimpleNamespace(exists=False)],
+        rivals=[[fits[r] for r in rivals]],
+    )
 
 
 @pytest.mark.parametrize("size", [0.0, 0.3, 2.0])
@@ -71,21 +99,158 @@ def test_without_a_gap_nothing_is_missing():
 
 
 def test_a_clear_effect_is_nearly_certain():
-    known = probabilities(base(2.0), None)
-    assert known["rolling_resistance"] > 0.99
+    made = base(2.0)
+    known = probabilities(made, chosen(made, "rolling_resistance"))
+    assert sum(known.values()) == pytest.approx(1.0)
     assert of_effects(known, ["rolling_resistance"]) > 0.99
 
 
 def test_effects_that_look_alike_share_it_the_common_one_first():
-    known = probabilities(base(2.0, alike=0.9999), None)
-    assert known["rolling_resistance"] > 2.0 * known["caster_trail"] > 0.2
+    made = base(2.0, alike=0.9999)
+    known = probabilities(made, chosen(made, "rolling_resistance", ["caster_trail"]))
+    there = of_effects(known, ["rolling_resistance"])
+    assert 0.95 > there > 2.0 * known["caster_trail"] > 0.02
 
 
 def test_a_force_that_no_effect_makes_is_outside_the_library():
-    assert probabilities(base(0.0, force=3.0), None)[OUTSIDE] > 0.95
+    # of drawn studies with so large a force and no effect, nine of ten were outside the library
+    known = probabilities(base(0.0, force=10.0), None)
+    assert max(known, key=lambda name: known[name]) == OUTSIDE
+    assert known[OUTSIDE] > 0.85
 
 
 def test_pairs_that_hold_an_effect_count_for_it():
     known = {"a": 0.5, "a+b": 0.3, "b": 0.1, "none": 0.1}
     assert of_effects(known, ["a"]) == pytest.approx(0.8)
     assert of_effects(known, ["a", "b"]) == pytest.approx(0.3)
+
+
+def weights(evidence):
+    """Two effects, their pair, nothing, and a force outside the library."""
+    known = {"a": evidence, "b": 4.0, "a+b": evidence - 2.0, NONE: 0.0, OUTSIDE: 1.0}
+    return {name: Weight(math.log(0.2), value, True) for name, value in known.items()}
+
+
+@pytest.mark.parametrize(("gap_left", "rivals"), [(False, False), (False, True), (True, False)])
+def test_more_evidence_never_makes_an_effect_less_probable(gap_left, rivals):
+    known = [
+        calibration.shipped().probabilities(weights(e), Chosen("a", gap_left, rivals))
+        for e in np.linspace(-20.0, 4000.0, 400)
+    ]
+    assert all(sum(k.values()) == pytest.approx(1.0) for k in known)
+    there = [of_effects(k, ["a"]) for k in known]
+    assert np.all(np.diff(there) > -1e-9)
+    assert there[-1] - there[0] > 0.5
+
+
+def test_an_effect_that_leaves_a_gap_is_less_sure():
+    shipped = calibration.shipped()
+    whole, rest = (
+        shipped.probabilities(weights(80.0), Chosen("a", left)) for left in (False, True)
+    )
+    assert of_effects(whole, ["a"]) > 0.95 > of_effects(rest, ["a"])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("temper = ", "temper = -", "must be at least 1"),
+        ("temper = ", "tempre = ", "temper"),
+        ("right = [", "right = [2.0, ", "as many odds as shares"),
+        ("odds = [", "odds = [nan, ", "as many odds as shares"),
+        ("[effects]", "[effects", "not TOML"),
+    ],
+)
+def test_a_damaged_file_is_one_line(tmp_path, old, new, said):
+    text = calibration.FILE.read_text(encoding="utf-8")
+    assert old in text
+    damaged = tmp_path / "calibration.toml"
+    damaged.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(MjchairError) as error:
+        calibration.read(damaged)
+    line = str(error.value)
+    assert said in line and str(damaged) in line and "\n" not in line
+    assert "install mjchair anew" in line
+
+
+def test_a_line_that_falls_is_refused(tmp_path):
+    text = calibration.FILE.read_text(encoding="utf-8")
+    damaged = tmp_path / "calibration.toml"
+    damaged.write_text(re.sub(r"right = \[0\.\d+", "right = [0.9999", text), encoding="utf-8")
+    with pytest.raises(MjchairError, match="each list rising"):
+        calibration.read(damaged)
+
+
+@pytest.mark.parametrize("of", calibration.LINES)
+def test_the_stored_lines_rise_and_promise_no_certainty(of):
+    line = getattr(calibration.shipped(), of)
+    assert np.all(np.diff(line.odds) > 0.0) and np.all(np.diff(line.right) >= 0.0)
+    assert line.at(-1e3) > 0.0 and line.at(1e3) < 1.0
+
+
+SHAPES = ("rolling_resistance", "air_drag", "toe", "caster_trail", "turning_scrub", "drive_lag")
+
+
+def made_up_bed():
+    """A base study of smooth random columns, of which two are much alike; none was fitted to."""
+    from calibration_draws import Bed
+    from calibration_studies import FORCES, Block, Kept
+
+    rng = np.random.default_rng(3)
+    starts = [start(name) for name in SHAPES]
+    blocks = []
+    for k in range(6):
+        time = np.linspace(0.0, 2.0, 40)
+        smooth = np.exp(-0.5 * ((time[:, None] - time[None, :]) / 0.3) ** 2)
+        smooth = np.linalg.cholesky(smooth + 1e-8 * np.eye(time.size))
+        J = np.vstack([smooth @ rng.standard_normal((40, 2 + len(SHAPES))) for _ in range(2)])
+        J[:, 3] = 0.97 * J[:, 2] + 0.25 * J[:, 3]  # beside two nuisances
+        at = np.linspace(0.2, 1.8, 6)
+        blocks.append(
+            Block(
+                J=J,
+                Z=J @ rng.standard_normal((J.shape[1], 2)) * 0.1 + rng.standard_normal((80, 2)),
+                precision=np.full(2, 1e-4),
+                states=2,
+                strange=np.vstack([smooth @ rng.standard_normal((40, 3)) for _ in range(2)]),
+                pulses={f: (at, rng.standard_normal((80, 6)) / 5.0) for f in FORCES},
+                channel=np.repeat([0, 1], 40),
+                frequency=np.tile(np.arange(40) / 4.0, 2),
+                run=k // 2,
+            )
+        )
+    columns = [*(RoughlyKnown(n) for n in ("one", "two")), *(s.columns[0] for s in starts)]
+    return Bed(
+        Kept(
+            name="made up",
+            columns=columns,
+            nuisance=2,
+            hidden=np.zeros(len(columns), bool),
+            starts=starts,
+            blocks=blocks,
+            fitted=np.arange(6),
+            manoeuvres=["coast", "push", "turn"],
+            levels={str(p): np.full(3, 0.3) for p in KINDS},
+        )
+    )
+
+
+def test_probabilities_of_chosen_effects_come_true_as_often_as_they_say():
+    from calibration_draws import diagnosed, draw, linear
+
+    bed, told, right = made_up_bed(), [], []
+    for number in range(COUNT):
+        truth, y = draw(bed, np.random.default_rng(number))
+        with linear():
+            said = diagnosed(bed, y)
+        if said["chosen"]:
+            known = calibration.shipped().probabilities(
+                {n: Weight(*w) for n, w in said["weights"].items()},
+                Chosen(said["chosen"], said["gap_left"], said["rivals"] > 0),
+            )
+            told.append(of_effects(known, said["chosen"].split("+")))
+            right.append(calibration.holds(truth.name, said["chosen"]))
+    p = np.array(told)
+    assert len(p) > COUNT // 4
+    spread = math.sqrt(float((p * (1.0 - p)).sum()))
+    assert abs(sum(right) - p.sum()) < 3.0 * spread

@@ -3,7 +3,8 @@
 In: the screened columns, the fits that were made, and the gap. Out: a probability for each
 hypothesis, which sum to 1. The evidence of a hypothesis is Laplace's: the chi2 that it gains, less
 what its parameters could have been fitted to (the logarithm of how much narrower data make them
-than they were known to be). The noise in it is the whole one, of sensors and of the process.
+than they were known to be). The noise in it is the whole one, of sensors and of the process. From
+evidence to probabilities it goes by a stored calibration (calibration.py).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from scipy.special import logsumexp
 
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import calibration, hypotheses
+from mjchair.diagnosis.explain.calibration import NONE, OUTSIDE, Chosen, Weight
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Choice, gain
 from mjchair.diagnosis.explain.column_ids import ForceGroup
@@ -27,24 +29,35 @@ from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.replay.pulses import Force
 
 Array = NDArray[np.float64]
-NONE, OUTSIDE = "none", "outside"
 SIZES = 2.0  # sizes worth finding: standard deviation of a parameter before any data
 SPREAD = {Force.FORWARD: 5.0, Force.YAW: 1.5}  # N, N m: the same of a force outside the library
 # before any data (assumptions); what is left goes to one effect
 PRIOR_NONE, PRIOR_TWO, PRIOR_OUTSIDE = 0.3, 0.2, 0.1
 PRIOR_THREE = 0.05
-LEAST = 1e-3  # a probability that is listed
-UNFITTED = 0.5 * rules.RIVAL_CHI2  # logarithm by which what was not fitted is behind at least
 
 
 def probabilities(base: Base, choice: Choice | None) -> dict[str, float]:
-    """Probability of every hypothesis, largest first: keys of effects joined by "+"."""
-    logs = _evidences(base, choice)
-    total = logsumexp(list(logs.values()))
-    known = {name: math.exp(value - total) for name, value in logs.items()}
-    listed = {n: p for n, p in known.items() if p >= LEAST or n in (NONE, OUTSIDE)}
-    listed[OUTSIDE] += 1.0 - sum(listed.values())
-    return dict(sorted(listed.items(), key=lambda item: -item[1]))
+    """Probability of every hypothesis, largest first: keys of effects joined by "+".
+
+    They sum to 1; tiny ones are left out.
+
+    Raises:
+      MjchairError: the stored calibration is damaged.
+    """
+    known = calibration.shipped().probabilities(weights(base, choice), chosen(choice))
+    return dict(sorted(known.items(), key=lambda item: -item[1]))
+
+
+def chosen(choice: Choice | None) -> Chosen | None:
+    """What the calibration asks about a choice."""
+    if choice is None:
+        return None
+    rivals = any(choice.rivals)
+    return Chosen(_name(choice.hypothesis), choice.after[-1].exists, rivals)
+
+
+def _name(h: Hypothesis) -> str:
+    return "+".join(h.keys)
 
 
 def of_effects(probability: Mapping[str, float], keys: Sequence[str]) -> float:
@@ -53,22 +66,24 @@ def of_effects(probability: Mapping[str, float], keys: Sequence[str]) -> float:
     return sum(p for name, p in probability.items() if wanted <= set(name.split("+")))
 
 
-def _evidences(base: Base, choice: Choice | None) -> dict[str, float]:
-    """Logarithm of prior times evidence of every hypothesis."""
+def weights(base: Base, choice: Choice | None) -> dict[str, Weight]:
+    """What speaks for every hypothesis, by its name."""
     reduced, starts = base.reduced, base.starts
     keys = {s.effect.key: s.effect.common for s in starts}
     everything = sum(keys.values())
     one = 1.0 - PRIOR_NONE - PRIOR_TWO - PRIOR_OUTSIDE
-    outside = calibration.worth(_outside(reduced))
-    out = {NONE: math.log(PRIOR_NONE), OUTSIDE: math.log(PRIOR_OUTSIDE) + outside}
+    out = {
+        NONE: Weight(math.log(PRIOR_NONE), 0.0, True),
+        OUTSIDE: Weight(math.log(PRIOR_OUTSIDE), _outside(reduced), True),
+    }
     kept = _kept(base, choice)
 
     def add(h: Hypothesis, prior: float) -> None:
-        name = "+".join(h.keys)
+        name = _name(h)
         share = math.prod(keys[k] / everything for k in h.keys) * math.factorial(len(h.keys))
-        worth = calibration.worth(_evidence(reduced, h, kept.get(name), starts))
-        value = math.log(prior * share) + worth
-        out[name] = max(value, out.get(name, -math.inf))
+        evidence = _evidence(reduced, h, kept.get(name), starts)
+        if name not in out or evidence > out[name].evidence:
+            out[name] = Weight(math.log(prior * share), evidence, name in kept)
 
     for h in hypotheses.singles(reduced, starts):
         add(h, one)
@@ -77,7 +92,6 @@ def _evidences(base: Base, choice: Choice | None) -> dict[str, float]:
             add(h, PRIOR_TWO)
         if len(choice.hypothesis.starts) == rules.MOST:
             add(choice.hypothesis, PRIOR_THREE)
-        out = _bounded_by_fit(out, choice, kept)
     return out
 
 
@@ -85,27 +99,9 @@ def _kept(base: Base, choice: Choice | None) -> dict[str, float]:
     """Chi2 that the hypotheses gain which were fitted."""
     if choice is None:
         return {}
-    fits = {"+".join(choice.hypothesis.keys): gain(base, choice.fitted)}
-    for group in choice.tried:
-        fits["+".join(group.hypothesis.keys)] = gain(base, group.fitted)
-    fits["+".join(choice.hypothesis.keys)] = gain(base, choice.fitted)
+    fits = {_name(tried.hypothesis): gain(base, tried.fitted) for tried in choice.tried}
+    fits[_name(choice.hypothesis)] = gain(base, choice.fitted)
     return fits
-
-
-def _bounded_by_fit(
-    out: dict[str, float], choice: Choice, kept: Mapping[str, float]
-) -> dict[str, float]:
-    """No hypothesis that was not fitted comes near the choice: large linear promises lie.
-
-    A rival that was near enough to be fitted has been; one that holds the choice and more has not
-    brought enough to be taken.
-    """
-    mine = "+".join(choice.hypothesis.keys)
-    roof = out.get(mine, -math.inf)
-    return {
-        name: value if name in kept or name in (NONE, OUTSIDE) else min(value, roof - UNFITTED)
-        for name, value in out.items()
-    }
 
 
 def _evidence(
