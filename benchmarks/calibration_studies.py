@@ -44,7 +44,7 @@ from mjchair.diagnosis.fit.elimination import eliminate_window
 from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.replay.sampling import residual
 from mjchair.effects.library import find
-from mjchair.model.engine_warnings import unheard
+from mjchair.model.engine_warnings import without_engine_warnings
 
 Array = NDArray[np.float64]
 SEED = 900
@@ -330,7 +330,7 @@ def one(made: Made, out: Path, known: bool = False) -> dict:
     folder = out / f"study_{made.name}"
     answer = make_study(made, folder)
     began = time.perf_counter()
-    with threadpool_limits(1, user_api="blas"), unheard():
+    with threadpool_limits(1, user_api="blas"), without_engine_warnings():
         study = read_study(folder)
         bench, first = prepare(study, threads=1)
         base = screen_columns(bench, first, study_effects(study))

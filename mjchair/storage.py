@@ -15,7 +15,7 @@ from mjchair.errors import MjchairError
 
 
 @contextmanager
-def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
+def atomic_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary path beside `path`, renamed to it when the block ends without an exception.
 
     The temporary file keeps the suffix of `path`, since writers choose the format by it.
@@ -45,8 +45,8 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
-    """Write `content` to `path`, whole or not at all; see `whole` for what it raises."""
-    with whole(path) as temporary:
+    """Write `content` to `path`, whole or not at all; see `atomic_file` for what it raises."""
+    with atomic_file(path) as temporary:
         if isinstance(content, str):
             temporary.write_text(content, encoding="utf-8")
         else:
@@ -105,7 +105,7 @@ def output_folder(path: str | os.PathLike[str], force: bool = False) -> Path:
     return folder
 
 
-def bounded(path: Path, largest: int, kind: str, reason: str) -> bytes:
+def read_bounded(path: Path, largest: int, kind: str, reason: str) -> bytes:
     """What is in a file, if that is no more than `largest` bytes.
 
     Args:

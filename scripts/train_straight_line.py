@@ -27,7 +27,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 from mjchair import tasks
 from mjchair.report.figure_file import save
-from mjchair.storage import output_folder, whole
+from mjchair.storage import atomic_file, output_folder
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -94,7 +94,7 @@ def film(policy, path: Path, seed: int, width: int) -> None:
         frames.append(physics.render(height, width, camera_id="follow"))
         over = ended or cut
     mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
-    with whole(path) as temporary:
+    with atomic_file(path) as temporary:
         mediapy.write_video(temporary, frames, fps=10)
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import mjchair
-from mjchair.model.engine_warnings import unheard
+from mjchair.model.engine_warnings import without_engine_warnings
 from mjchair.simulation import batch
 
 
@@ -30,7 +30,7 @@ def blows_up(tmp_path, monkeypatch):
 
 
 def test_a_chair_that_blows_up_in_a_search_writes_nothing(blows_up, tmp_path, capfd):
-    with unheard():
+    with without_engine_warnings():
         blows_up()
     assert capfd.readouterr() == ("", "")
     assert not list(tmp_path.iterdir())
@@ -41,7 +41,7 @@ def test_outside_the_block_who_listened_before_hears_the_engine_again(blows_up):
     before, heard = mujoco.get_mju_user_warning(), []
     mujoco.set_mju_user_warning(heard.append)
     try:
-        with unheard():
+        with without_engine_warnings():
             blows_up()
         assert heard == []
         blows_up()

@@ -20,7 +20,7 @@ from mjchair.diagnosis.replay.cache import Store
 from mjchair.diagnosis.result import Diagnosis
 from mjchair.effects.effect import Effect
 from mjchair.effects.library import library
-from mjchair.model.engine_warnings import unheard
+from mjchair.model.engine_warnings import without_engine_warnings
 
 
 def study_effects(study: Study, more: Sequence[Effect] = ()) -> list[Effect]:
@@ -61,7 +61,7 @@ def diagnose(
     # threads cost the linear algebra more than they bring on matrices this small
     from threadpoolctl import threadpool_limits  # sets an environment variable when imported
 
-    with threadpool_limits(1, user_api="blas"), unheard():
+    with threadpool_limits(1, user_api="blas"), without_engine_warnings():
         bench, first = prepare(known, say, store, threads)
         base = screen_columns(bench, first, study_effects(known, effects), say)
         say("the gap")

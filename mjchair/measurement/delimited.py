@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mjchair.csv_table import Rows, numbers
 from mjchair.errors import MjchairError
-from mjchair.storage import bounded
+from mjchair.storage import read_bounded
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ def read_text(path: Path) -> list[str]:
     Raises:
       MjchairError: it cannot be read, is too large, or holds binary data.
     """
-    data = bounded(path, LARGEST, "a text file", f"{LARGEST // 1_000_000} MB; cut it in parts")
+    data = read_bounded(path, LARGEST, "a text file", f"{LARGEST // 1_000_000} MB; cut it in parts")
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return data.decode("utf-16", errors="replace").splitlines()
     if b"\x00" in data[:4096]:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from mjchair.csv_table import read_columns
 from mjchair.errors import MjchairError, nearest
-from mjchair.storage import bounded, write_whole
+from mjchair.storage import read_bounded, write_whole
 
 Array = NDArray[np.float64]
 
@@ -133,7 +133,7 @@ def _cell(cell: object) -> str:
 def _columns(path: Path) -> dict[str, Array]:
     """Every known column as numbers, an empty cell as NaN."""
     reason = f"{LARGEST // 1_000_000} MB; a rig table has a row a run"
-    data = bounded(path, LARGEST, "a rig table", reason)
+    data = read_bounded(path, LARGEST, "a rig table", reason)
     header, columns = read_columns(data, str(path), wanted={*REQUIRED, *LATERAL, *OPTIONAL})
     if len(set(header)) < len(header):
         raise MjchairError(f"{path}: a column is there twice; keep one")

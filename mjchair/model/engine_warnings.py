@@ -12,7 +12,7 @@ import mujoco
 
 
 @contextmanager
-def unheard() -> Iterator[None]:
+def without_engine_warnings() -> Iterator[None]:
     """Within the block nobody hears a warning: no terminal, no MUJOCO_LOG.TXT, and no other library
     that listens in this process, as dm_control does."""
     before, quiet = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()

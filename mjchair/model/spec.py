@@ -28,7 +28,7 @@ from mjchair.drive.files import read_drive
 from mjchair.drive.quantities import Drive
 from mjchair.errors import MjchairError, nearest
 from mjchair.model import assets, merged_visual_geoms, parts, seating
-from mjchair.model.engine_warnings import unheard
+from mjchair.model.engine_warnings import without_engine_warnings
 from mjchair.model.ground import FLOOR, read_heights, set_heights, set_step
 from mjchair.model.parameters import ChairParameters
 from mjchair.model.wheels import (
@@ -367,7 +367,7 @@ def _without_plain_frames(text: str) -> str:
 @contextmanager
 def _silent() -> Iterator[None]:
     """Suppress MuJoCo's warnings and Python's inside the block."""
-    with unheard(), warnings.catch_warnings():
+    with without_engine_warnings(), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         yield
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from mjchair.errors import MjchairError
-from mjchair.storage import whole
+from mjchair.storage import atomic_file
 
 # Metadata that matplotlib would write, such as its version, are left out, so that equal pictures
 # give equal files.
@@ -31,5 +31,5 @@ def save(figure: Figure, path: str | os.PathLike[str], dpi: int = 130) -> None:
     known = figure.canvas.get_supported_filetypes()
     if suffix.lstrip(".") not in known:
         raise MjchairError(f"{path}: a figure ends in one of {', '.join(sorted(known))}")
-    with whole(path) as temporary:
+    with atomic_file(path) as temporary:
         figure.savefig(temporary, dpi=dpi, metadata=SAME_BYTES.get(suffix))

@@ -27,7 +27,7 @@ from mjchair.report.forces import Array, WheelForces, wheel_forces
 from mjchair.report.slope_scenery import Box, build_ramp, grade_of
 from mjchair.simulation.initial import tire_geoms
 from mjchair.simulation.recording import Recording, Status
-from mjchair.storage import whole
+from mjchair.storage import atomic_file
 
 Frame = NDArray[np.uint8]
 
@@ -330,7 +330,7 @@ def write_film(
     mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
     wanted = samples_at(recording, fps, speed)
     with (
-        whole(path) as temporary,
+        atomic_file(path) as temporary,
         Film(recording, width, height, view) as film,
         mediapy.VideoWriter(temporary, (height, width), fps=fps, crf=23) as writer,
     ):
@@ -353,5 +353,5 @@ def write_frame(
     sample = int(np.argmin(np.abs(recording.time - time)))
     with Film(recording, width, height, view) as film:
         pixels = film.frame(sample)
-    with whole(path) as temporary:
+    with atomic_file(path) as temporary:
         Image.fromarray(pixels).save(temporary)

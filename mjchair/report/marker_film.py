@@ -17,7 +17,7 @@ from mjchair.errors import MjchairError
 from mjchair.motion.inverse_kinematics import Motion
 from mjchair.report import gl
 from mjchair.rider.anatomy import JOINTS
-from mjchair.storage import whole
+from mjchair.storage import atomic_file
 
 Array = NDArray[np.float64]
 Frame = NDArray[np.uint8]
@@ -111,7 +111,7 @@ def write_marker_film(motion: Motion, path: str | os.PathLike[str]) -> None:
     rate = 1.0 / float(np.median(np.diff(motion.time)))
     wanted = np.arange(0, motion.time.size, max(1, round(rate / FPS)))
     with (
-        whole(path) as temporary,
+        atomic_file(path) as temporary,
         MarkerFilm(motion) as film,
         mediapy.VideoWriter(temporary, (SIZE[1], SIZE[0]), fps=FPS, crf=23) as writer,
     ):

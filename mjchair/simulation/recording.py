@@ -27,7 +27,7 @@ from mjchair.simulation.frozen import FrozenRecord
 from mjchair.simulation.names import same
 from mjchair.simulation.stored_model import StoredModel
 from mjchair.simulation.table import Array, frozen
-from mjchair.storage import whole
+from mjchair.storage import atomic_file
 
 GRAVITY = ("gravity.x", "gravity.y", "gravity.z")  # channels of a run with turning gravity
 FORMAT = "mjchair recording"
@@ -239,7 +239,7 @@ class Recording(FrozenRecord):
             "versions": dict(self.versions),
             "model_form": self.model.form,
         }
-        with whole(path) as temporary, temporary.open("wb") as file:
+        with atomic_file(path) as temporary, temporary.open("wb") as file:
             np.savez_compressed(
                 file,
                 header=np.array(json.dumps(header)),
@@ -259,7 +259,7 @@ class Recording(FrozenRecord):
         """
         header = list(self.columns)
         rows = np.column_stack(list(self.columns.values())).tolist()
-        with whole(path) as temporary, temporary.open("w", encoding="utf-8") as file:
+        with atomic_file(path) as temporary, temporary.open("w", encoding="utf-8") as file:
             file.write(",".join(header) + "\n")
             for row in rows:
                 file.write(",".join("" if x != x else f"{x:.9g}" for x in row) + "\n")

@@ -21,7 +21,7 @@ from tqdm import tqdm
 
 from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
-from mjchair.model.engine_warnings import unheard
+from mjchair.model.engine_warnings import without_engine_warnings
 from mjchair.model.spec import compile_spec
 from mjchair.model.wheels import check_timestep
 from mjchair.simulation import names
@@ -104,7 +104,7 @@ def simulate(
         controls = inputs.control_array(model, times)
     stored = StoredModel.of(model, spec)
 
-    with installed(compiled), unheard():
+    with installed(compiled), without_engine_warnings():
         data = start(model, as_initial(initial), brakes, controls[0])
         states, sensed, reason = _run(model, data, controls, every, progress)
     made = assembled(model, stored, states, sensed, controls[::every], reason, every)

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from mjchair.drive.block import JOYSTICK
 from mjchair.engine.install import installed
 from mjchair.errors import MjchairError, nearest
-from mjchair.model.engine_warnings import unheard
+from mjchair.model.engine_warnings import without_engine_warnings
 from mjchair.model.spec import compile_spec
 from mjchair.model.wheels import base_name, check_timestep
 from mjchair.simulation import names
@@ -221,7 +221,7 @@ class Simulator:
         sticks = [n for n in self._drivable if base_name(n) in JOYSTICK]
         self.inputs = tuple(sticks or [n for n in self._drivable if base_name(n) in WHEELS])
         self._compiled, self._real_time = compiled, real_time
-        with installed(compiled), unheard():
+        with installed(compiled), without_engine_warnings():
             self.data = start(self.model, as_initial(initial), brakes)
         self._observer = Observer(self.model)
         self._to_chair = Messages(commands or Link())
@@ -251,7 +251,7 @@ class Simulator:
           ControllerError: the command is not one; the chair has not moved.
         """
         self._to_chair.send(self.time, self._checked(command))
-        with installed(self._compiled), unheard():
+        with installed(self._compiled), without_engine_warnings():
             for _ in range(self._steps):
                 self._advance()
         self._wait()
@@ -309,7 +309,7 @@ class Simulator:
 
     def _look(self) -> Observation:
         """The observation at the present state."""
-        with installed(self._compiled), unheard():
+        with installed(self._compiled), without_engine_warnings():
             warm = self.data.qacc_warmstart.copy()
             mujoco.mj_forward(self.model, self.data)
             self.data.qacc_warmstart[:] = warm

@@ -16,7 +16,7 @@ import pyarrow
 import pyarrow.parquet
 
 from mjchair.errors import MjchairError
-from mjchair.storage import whole, write_whole
+from mjchair.storage import atomic_file, write_whole
 from mjchair.sweep.study import Study
 
 DESCRIPTION = "study.json"  # which study the folder belongs to
@@ -85,7 +85,7 @@ class Dataset:
         """
         columns = list(dict.fromkeys(name for row in rows for name in row))
         table = pyarrow.table({name: _column([row.get(name) for row in rows]) for name in columns})
-        with whole(self.path(first)) as temporary:
+        with atomic_file(self.path(first)) as temporary:
             pyarrow.parquet.write_table(table, temporary)
 
 

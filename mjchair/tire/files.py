@@ -9,7 +9,7 @@ import os
 from pathlib import Path
 
 from mjchair.errors import MjchairError, nearest
-from mjchair.storage import bounded, write_whole
+from mjchair.storage import read_bounded, write_whole
 from mjchair.tire import tir, toml
 from mjchair.tire.tire import Tire
 
@@ -61,7 +61,7 @@ def _text(file: Path) -> str:
     """The file's text: bounded, and text at all."""
     _format(file)
     reason = f"{LARGEST // 1000} kB, which no tire file has"
-    data = bounded(file, LARGEST, "a tire file", reason)
+    data = read_bounded(file, LARGEST, "a tire file", reason)
     if not data.strip():
         raise MjchairError(f"{file}: the file is empty")
     try:

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjchair.storage import whole
+from mjchair.storage import atomic_file
 from mjchair.tire import compiled
 
 Array = NDArray[np.float64]
@@ -60,5 +60,5 @@ class Store:
 
     def save(self, key: str, arrays: Sequence[Array]) -> None:
         """Keep arrays, whole or not at all."""
-        with whole(self.folder / f"{key}.npz") as path:
+        with atomic_file(self.folder / f"{key}.npz") as path:
             np.savez(path, **{f"w{i}": a for i, a in enumerate(arrays)})  # type: ignore[arg-type]
