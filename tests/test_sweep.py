@@ -205,7 +205,7 @@ def test_a_killed_worker_loses_nothing(tmp_path):
         workers = [worker(address, name) for name in ("one", "two")]
         try:
             with distributed.Client(address, set_as_default=False) as client:
-                client.wait_for_workers(2, timeout=60)
+                client.wait_for_workers(2, timeout=600)
                 killed = killer(client, "one", workers[0])
                 table = sweep.run(study, tmp_path / "out", scheduler=address)
                 assert killed.wait(), "no worker was killed: the test shows nothing"
@@ -226,7 +226,7 @@ def killer(client, name, process):
     address = next(place for place, told in known.items() if told["name"] == name)
 
     def watch():
-        for _ in range(6000):
+        for _ in range(60_000):
             if client.processing().get(address):
                 time.sleep(0.05)
                 os.kill(process.pid, signal.SIGKILL)
@@ -239,7 +239,7 @@ def killer(client, name, process):
     class Waiter:
         @staticmethod
         def wait():
-            return done.wait(1.0) and process.poll() == -signal.SIGKILL
+            return done.wait(1.0) and process.wait(60) == -signal.SIGKILL
 
     return Waiter
 
