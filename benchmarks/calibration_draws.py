@@ -27,7 +27,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from calibration_studies import Kept
+from calibration_studies import DRAWN, MADE, Kept
 from numpy.typing import NDArray
 from scipy import special
 from scipy.linalg import cho_factor, cho_solve
@@ -516,14 +516,14 @@ def main() -> None:
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("out", type=Path)
-    parser.add_argument("--count", type=int, default=150)
+    parser.add_argument("--count", type=int, default=130)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", nargs="*")
     args = parser.parse_args()
     path = args.out / "draws.jsonl"
     lines = path.read_text().splitlines() if path.exists() else []
     have = [(r["study"], r["seed"], r["number"]) for r in map(json.loads, lines)]
-    for file in sorted(args.out.glob("*.pkl")):
+    for file in (args.out / f"{made.name}.pkl" for made in MADE[:DRAWN]):
         if args.only and file.stem not in args.only:
             continue
         with file.open("rb") as source:
