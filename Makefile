@@ -28,6 +28,7 @@ pictures: $(READY) graphics
 docs: $(VENV)/docs-ready graphics
 	NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build
 	@echo "Open this file in a browser: $(CURDIR)/out/site/index.html"
+	@echo "Its search needs a server: $(RUN) -m http.server --directory out/site"
 
 bench: $(READY)
 	$(RUN) benchmarks/bench.py

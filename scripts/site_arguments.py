@@ -8,6 +8,7 @@ mkdocstrings loads the extension (mkdocs.yml).
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from typing import Any
 
 import griffe
@@ -27,17 +28,24 @@ class OneALine(griffe.Extension):
             if member.is_alias:
                 continue
             if member.docstring and isinstance(member, griffe.Function | griffe.Class):
-                member.docstring.value = split(member.docstring.value)
+                member.docstring.value = split(member.docstring.value, _names(member))
             if isinstance(member, griffe.Module | griffe.Class):
                 self._through(member)
 
 
-def split(text: str) -> str:
-    """A docstring with one name a line in its sections of arguments and attributes."""
+def _names(member: griffe.Function | griffe.Class) -> set[str]:
+    """Of arguments, and of a class's attributes."""
+    names = {parameter.name for parameter in member.parameters}
+    return names | set(member.attributes) if isinstance(member, griffe.Class) else names
+
+
+def split(text: str, names: Collection[str]) -> str:
+    """A docstring with one of these names a line in its sections of arguments and attributes."""
+    begin = re.compile(rf"(?<=[.;]) ((?:{'|'.join(map(re.escape, names))}): )") if names else None
     lines: list[str] = []
     inside = False
     for line in text.splitlines():
         if not line.startswith(" "):
             inside = line in SECTIONS or (inside and not line)
-        lines.append(re.sub(r"(?<=[.;]) (?!None)(\w+: )", r"\n  \1", line) if inside else line)
+        lines.append(begin.sub(r"\n  \1", line) if begin and inside else line)
     return "\n".join(lines)
