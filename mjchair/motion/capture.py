@@ -1,4 +1,4 @@
-"""Motion capture into a table of the rider's joints: the whole way.
+"""All steps from motion capture to a table of the rider's joints.
 
 In: a file of markers, perhaps a static trial, a marker set, and whose body it is. Out: a `Motion`,
 and its table as text: `time`, the joints that markers tell (rad), `rider_motion` (m), and

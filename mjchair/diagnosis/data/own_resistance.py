@@ -1,4 +1,4 @@
-"""What a chair's own wheels hold it back with: the measure of forces that matter.
+"""Rolling resistance of a chair on level ground: the measure of forces that matter.
 
 In: the specification of a chair. Out: its rolling resistance on level ground, N.
 """

@@ -1,4 +1,4 @@
-"""What there is of a measured run: its span, its clock, dead channels, and what drove it.
+"""Checks of a measured run: its span, its clock, channels without a signal, and its inputs.
 
 In: a trial as it was read. Out: the trial as it is used and notes on what was left out, or one line
 on why it cannot be used.

@@ -1,4 +1,4 @@
-"""From what speaks for each hypothesis to probabilities that keep their word.
+"""Calibrated probabilities from the evidence for each hypothesis.
 
 What it does: reads calibration.toml, which stands beside this file and was fitted to some thousand
 cheap studies (benchmarks/calibration.py). What goes in: prior and evidence of every hypothesis, and

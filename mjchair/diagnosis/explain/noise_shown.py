@@ -1,4 +1,4 @@
-"""The noise that a study shows once everything smooth is explained, known effect or not.
+"""The noise of a study, after all that is smooth is explained, by a known effect or not.
 
 In: a bench with first guesses of its sensors' noise, and answers to pulses of force. Out: the bench
 with the sensors' powers and the levels of what shakes the chair as the study shows them. Forces

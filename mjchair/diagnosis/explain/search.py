@@ -1,4 +1,4 @@
-"""Which effects: grown from one to as many as the data ask for, and held against rivals.
+"""The search for effects: from one to as many as the data need, compared with rivals.
 
 In: the screened columns and the gap. Out: a `Choice`, or None where no effect brings anything. The
 rules that decide stand in rules.py; a hypothesis that this chair cannot have is dropped and noted.

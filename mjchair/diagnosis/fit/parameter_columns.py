@@ -1,4 +1,4 @@
-"""The columns of a fit: how every prediction answers to nuisances and to parameters of effects.
+"""The columns of a fit: derivatives of predictions by nuisances and parameters of effects.
 
 In: a variant of the chair and its track. Out: columns, in prior standard deviations or typical
 changes.

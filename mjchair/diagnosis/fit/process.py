@@ -1,4 +1,4 @@
-"""What shakes a chair that no effect makes: coloured forces and moments, and encoders' wobble.
+"""Process noise: coloured forces and moments that no effect makes, and encoders that wobble.
 
 In: the answers of every window's samples to pulses of force, and levels. Out: columns of the
 disturbances of a window, white, each with a prior of one standard deviation, to be eliminated

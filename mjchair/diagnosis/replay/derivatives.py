@@ -1,4 +1,4 @@
-"""How every prediction answers to a nuisance or to an effect: one rollout a column.
+"""Derivatives of every prediction by a nuisance or an effect: one rollout a column.
 
 In: the states of the windows, and edits of the chair. Out: columns, the change of every predicted
 sample.

@@ -1,4 +1,4 @@
-"""Noise once more, from what a first pass over the windows leaves.
+"""A second estimate of the noise, from what a first pass over the windows leaves.
 
 In: the windows' states as fitted with a first guess of the noise. Out: the noise of every channel.
 """

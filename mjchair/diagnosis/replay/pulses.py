@@ -1,4 +1,4 @@
-"""Pulses of force: triangular forces in time that every window's predictions are asked about.
+"""Pulses of force, triangular in time, and the derivatives of every prediction by them.
 
 In: windows with their states. Out: for every pulse of one newton (or newton metre) what it changes
 in the samples of its window. Sums of pulses make a force of any course.

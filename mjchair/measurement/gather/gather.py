@@ -1,4 +1,4 @@
-"""People's own files into a study: the whole way.
+"""All steps from people's own files to a study.
 
 In: a folder of instruments' files, and what a person knows of chair, rider and floor. Out: the
 files of a study folder as text, the trials for a picture, and a line for everything found out.

@@ -1,4 +1,4 @@
-"""A pushed run without torque and without free rolling: the torque that its motion asks for.
+"""The torque of a pushed run without torque and without free rolling, estimated from its motion.
 
 In: the trial and the speed of a wheel. Out: the trial with a torque on both wheels. The torque is
 what a rigid chair needs to move as measured: mass times acceleration plus rolling resistance, times
