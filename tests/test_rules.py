@@ -247,19 +247,34 @@ def test_a_rival_is_fitted_where_linear_algebra_leaves_it_near():
     assert rules.worth_refitting(behind=30.0, gain=150.0, rival_gain=121.0)
     assert not rules.worth_refitting(behind=34.0, gain=150.0, rival_gain=121.0)
     assert not rules.worth_refitting(behind=30.0, gain=150.0, rival_gain=119.0)  # 80 % of the gain
+    # what linear algebra gets wrong of a large gain is larger than what decides
+    assert rules.worth_refitting(behind=290.0, gain=10_000.0, rival_gain=0.0)
+    assert not rules.worth_refitting(behind=310.0, gain=10_000.0, rival_gain=0.0)
+
+
+def test_linear_algebra_is_enough_where_its_errors_decide_nothing():
+    assert rules.linear_is_enough(300.0)
+    assert not rules.linear_is_enough(400.0)
+
+
+def test_a_fit_is_stuck_where_its_own_step_promises_what_decides():
+    assert not rules.is_stuck(total=1009.0, promised=1000.0)
+    assert rules.is_stuck(total=1011.0, promised=1000.0)
 
 
 @pytest.mark.parametrize(
-    ("behind", "errors", "beyond", "stays"),
+    ("behind", "gain", "errors", "beyond", "stays"),
     [
-        (9.9, 9.0, False, True),
-        (100.0, 1.9, False, True),
-        (10.0, 2.0, False, False),
-        (0.0, 0.0, True, False),
+        (9.9, 100.0, 9.0, False, True),
+        (100.0, 1000.0, 1.9, False, True),
+        (10.0, 400.0, 2.0, False, False),
+        (199.0, 10_000.0, 9.0, False, True),  # 2 % of the gain is a matter of form
+        (201.0, 10_000.0, 9.0, False, False),
+        (0.0, 100.0, 0.0, True, False),
     ],
 )
-def test_what_keeps_a_rival(behind, errors, beyond, stays):
-    kept = rules.stays_a_rival(behind=behind, errors=errors, beyond_bound=beyond)
+def test_what_keeps_a_rival(behind, gain, errors, beyond, stays):
+    kept = rules.stays_a_rival(behind=behind, gain=gain, errors=errors, beyond_bound=beyond)
     assert kept == stays
 
 

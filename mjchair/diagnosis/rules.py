@@ -25,11 +25,13 @@ HELD = 10.0  # chi2 that it must bring on runs that it was not fitted to
 SIGMAS = 4.0  # standard errors of a parameter away from neutral
 # what keeps a rival
 RIVAL_CHI2 = 10.0  # a rival this near, in chi2 with its penalty, is not ruled out
+FORM = 0.02  # of the gain: the form of no effect is better known (assumption)
 RIVAL_ERRORS = 2.0  # nor one this near in paired standard errors over windows
 # how hypotheses grow and shrink
 MOST = 3  # effects that are added
 PENALTY = 10.0  # chi2 that a parameter must bring: log of the number of samples
 WORTH = 15.0  # chi2 that a further effect must bring besides the penalty of its parameters
+LINEAR = 0.03  # share of its gain by which the linear promise of a hypothesis may be wrong
 NEXT = 0.1  # share of the best linear gain by which a hypothesis that is fitted too may be behind
 TIE = 6.0  # chi2 within which hypotheses fit alike
 SURE = 6.0  # standard errors beyond which an effect is not tried without
@@ -255,6 +257,11 @@ def can_be_dropped(*, lost: float, parameters: int) -> bool:
     return lost < needed(parameters)
 
 
+def linear_is_enough(gain: float) -> bool:
+    """Whether what linear algebra gets wrong of a fit with this gain is below what decides."""
+    return LINEAR * gain < RIVAL_CHI2
+
+
 def alike(score: float, best: float) -> bool:
     """Whether two hypotheses fit alike, by their scores (chi2 gained less penalties)."""
     return score > best - TIE
@@ -271,20 +278,29 @@ def worth_refitting(*, behind: float, gain: float, rival_gain: float) -> bool:
     Args:
       behind: by how much its score is lower. gain, rival_gain: chi2 that chosen and rival bring.
     """
-    if behind < RIVAL_CHI2:
+    if behind < max(RIVAL_CHI2, LINEAR * gain):
         return True
     near = behind < 3.0 * RIVAL_ERRORS * math.sqrt(max(gain - rival_gain, 0.0))
     return near and rival_gain > 0.8 * gain
 
 
-def stays_a_rival(*, behind: float, errors: float, beyond_bound: bool) -> bool:
+def is_stuck(*, total: float, promised: float) -> bool:
+    """Whether a fit ended where its own linear step still promises what decides.
+
+    Then the columns of what is only roughly known, which are made once, are too old.
+    """
+    return total - promised > RIVAL_CHI2
+
+
+def stays_a_rival(*, behind: float, gain: float, errors: float, beyond_bound: bool) -> bool:
     """Whether a fitted rival is not ruled out.
 
     Args:
-      behind: chi2 with penalties by which it fits worse. errors: the same in paired standard
-        errors over windows. beyond_bound: it alone would have to be larger than it can be.
+      behind: chi2 with penalties by which it fits worse. gain: chi2 that the chosen brings.
+      errors: `behind` in paired standard errors over windows. beyond_bound: it alone would have
+        to be larger than it can be.
     """
-    return not beyond_bound and (behind < RIVAL_CHI2 or errors < RIVAL_ERRORS)
+    return not beyond_bound and (behind < max(RIVAL_CHI2, FORM * gain) or errors < RIVAL_ERRORS)
 
 
 def paired_errors(theirs: Array, ours: Array) -> float:

@@ -10,13 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mjchair.diagnosis import rules
 from mjchair.diagnosis.data import first_state, roughly_known
 from mjchair.diagnosis.data.study import Study, with_copied_wheels
 from mjchair.diagnosis.explain import candidates, hypotheses, missing_force, noise_shown
 from mjchair.diagnosis.explain import gap as gaps
 from mjchair.diagnosis.explain.candidates import Around, Start
-from mjchair.diagnosis.explain.column_ids import EffectColumn
 from mjchair.diagnosis.explain.gap import Gap
+from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.bounded import Reduced
@@ -32,10 +33,11 @@ from mjchair.diagnosis.replay.pulses import pulse_answers, pulses
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.diagnosis.replay.window_states import Track, track
 from mjchair.effects.effect import Effect
+from mjchair.errors import MjchairError
 
 Say = Callable[[str], None]
 NEAR = 0.5  # prior standard deviations that columns of nuisances are good for
-SEEN = 10.0  # sigmas that one standard deviation of a nuisance changes
+SEEN = 1.0
 FAR = 2.5  # prior standard deviations: a nuisance there is not what moved
 AT_REST = 0.01  # m/s^2, bias of an accelerometer that was seen at rest
 
@@ -104,18 +106,15 @@ def screen_columns(
         variant, here, nuisances = plain.variant, plain.track, plain.columns
     around = Around(bench=bench, track=here, variant=variant, pulses=asked, answers=answers)
     tried = candidates.collect(around, effects, lambda key: say(f"effect {key}"))
-    columns = tried.columns
-    columns.update(missing_force.driver_columns(bench, here, around.pulses, around.answers))
+    columns = {
+        **tried.columns,
+        **missing_force.driver_columns(bench, here, around.pulses, around.answers),
+    }
     system = bench.system(here, {**nuisances, **columns}, len(nuisances), variant)
-    best = _best(bounded.reduce(system, bench.windows), tried.starts)
-    say("the noise that the best effects leave")
-    bench = noise_shown.with_noise_left_by(bench, here, nuisances, {c: columns[c] for c in best})
-    plain = refit(bench, plain.variant, plain.track, plain.columns)
-    system = bench.system(here, {**nuisances, **columns}, len(nuisances), variant)
-    return Base(
+    screened = Base(
         bench=bench,
         plain=plain,
-        around=replace(around, bench=bench),
+        around=around,
         nuisances=nuisances,
         columns=columns,
         starts=tried.starts,
@@ -123,15 +122,48 @@ def screen_columns(
         system=system,
         reduced=bounded.reduce(system, bench.windows),
     )
+    say("the noise that the best effects leave")
+    return _with_noise_left(screened)
 
 
-def _best(reduced: Reduced, starts: Sequence[Start]) -> list[EffectColumn]:
-    """Columns of the best hypothesis of any size, by linear algebra."""
+def _with_noise_left(base: Base) -> Base:
+    """The base with the noise that its best hypothesis leaves.
+
+    Where it gains much, it is fitted first: what linear algebra gets wrong of a large effect would
+    pass for noise.
+    """
+    best = _best(base.reduced, base.starts)
+    bench, here = base.bench, base.around.track
+    own: dict[ColumnId, Column] = {c: base.columns[c] for c in best.columns} if best else {}
+    if best is not None and not rules.linear_is_enough(best.gain):
+        start = replace(base.around.variant, terms=hypotheses.terms(base.reduced, best))
+        try:
+            fitted = refit(bench, start, here, base.nuisances)
+            here = fitted.track
+            own = {c: column for c, column in fitted.columns.items() if c not in base.nuisances}
+        except (MjchairError, np.linalg.LinAlgError):
+            pass  # these effects this chair cannot have: linear algebra must do
+    bench = noise_shown.with_noise_left_by(bench, here, base.nuisances, own)
+    plain = refit(bench, base.plain.variant, base.plain.track, base.plain.columns)
+    around = replace(base.around, bench=bench)
+    return _reduced_anew(replace(base, bench=bench, plain=plain, around=around))
+
+
+def _reduced_anew(base: Base) -> Base:
+    """The base with the linear algebra of all its columns made anew."""
+    around, bench = base.around, base.bench
+    every = {**base.nuisances, **base.columns}
+    system = bench.system(around.track, every, len(base.nuisances), around.variant)
+    return replace(base, system=system, reduced=bounded.reduce(system, bench.windows))
+
+
+def _best(reduced: Reduced, starts: Sequence[Start]) -> Hypothesis | None:
+    """The best hypothesis of any size, by linear algebra; None: none brings anything."""
     singles = hypotheses.singles(reduced, starts)
     pairs = hypotheses.pairs(reduced, starts)
     more = hypotheses.grown(reduced, starts, [h.starts for h in pairs[:3]]) if pairs else []
     known = [h for h in (*singles[:1], *pairs[:1], *more[:1]) if h.score > 0.0]
-    return max(known, key=lambda h: h.score).columns if known else []
+    return max(known, key=lambda h: h.score, default=None)
 
 
 def _farthest(plain: Fitted) -> float:

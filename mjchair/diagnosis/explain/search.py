@@ -20,11 +20,13 @@ from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.left_out import held_out, with_terms
 from mjchair.diagnosis.explain.screening import Base, Say, gap_after
 from mjchair.diagnosis.fit import bounded
-from mjchair.diagnosis.fit.nonlinear import Fitted, refit
+from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
 from mjchair.errors import MjchairError
 
 TRIED = 3  # hypotheses of one size, where the first leaves a gap
 REFITTED = 5  # rivals of one effect
+SHARES = (0.875, 0.75, 0.625, 0.5, 0.375, 0.25, 0.125)  # of linear coefficients, for a new start
+SWAPS = 2  # times that a rival takes the place of the chosen hypothesis
 
 
 @dataclass(frozen=True)
@@ -64,8 +66,7 @@ def choose(base: Base, gap: Gap, say: Say) -> Choice | None:
             break
     if best is None:
         return None
-    best = search.without_needless(best)
-    rivals = search.rivals(best)
+    best, rivals = search.against_rivals(search.without_needless(best))
     say("the last fit, with everything made anew around it")
     fitted = search.anew(best.fitted)
     after[-1] = gap_after(base, fitted)
@@ -160,6 +161,21 @@ class Search:
                 return self.without_needless(other)
         return tried
 
+    def against_rivals(self, chosen: Tried) -> tuple[Tried, list[list[Rival]]]:
+        """The best of the chosen hypothesis and what could stand in its places, with its rivals.
+
+        Linear algebra chose; a rival that fits better once both are fitted takes the place.
+        """
+        rivals = self.rivals(chosen)
+        for _ in range(SWAPS):
+            others = [Tried(r.hypothesis, r.fitted) for group in rivals for r in group]
+            better = min((o for o in others if _believable(o.fitted)), key=_price, default=chosen)
+            if better.price >= chosen.price:
+                break
+            chosen = self.without_needless(better)
+            rivals = self.rivals(chosen)
+        return chosen, rivals
+
     def rivals(self, chosen: Tried) -> list[list[Rival]]:
         """For every effect of the choice: what could stand in its place, best first."""
         hypothesis = chosen.hypothesis
@@ -172,7 +188,7 @@ class Search:
                 [
                     Rival(t.hypothesis, t.fitted)
                     for t in tried
-                    if t is not None and _not_ruled_out(t, chosen)
+                    if t is not None and _not_ruled_out(t, chosen, self.base.plain.total)
                 ]
             )
         return out
@@ -183,7 +199,7 @@ class Search:
         Returns:
           None where this chair cannot have these effects; that is noted.
         """
-        known = next((t for t in self.tried if t.hypothesis is hypothesis), None)
+        known = next((t for t in self.tried if t.hypothesis.starts == hypothesis.starts), None)
         if known is not None:
             return Tried(hypothesis, known.fitted)
         self.say("fit of " + " and ".join(hypothesis.keys))
@@ -194,14 +210,19 @@ class Search:
         return Tried(hypothesis, fitted)
 
     def _best_start(self, hypothesis: Hypothesis) -> Fitted | None:
-        """The better of two starts; of one, where it gets to what was promised."""
+        """The better of two starts; of one, where it gets to what was promised.
+
+        The second is the best place on the line from no effect to what linear algebra promises: a
+        tire with a quarter of its friction slides where one with a third of it does not.
+        """
         first = self._from(hypothesis, 1.0)
         promised = self.base.reduced.total - hypothesis.gain
         if first is not None and not rules.fell_short(
             total=first.total, promised=promised, gain=hypothesis.gain
         ):
             return first
-        second = self._from(hypothesis, 0.5)
+        share = self._best_share(hypothesis)
+        second = None if share is None else self._from(hypothesis, share)
         fits = [f for f in (first, second) if f is not None]
         if len(fits) > 1 and rules.starts_disagree(fits[0].total, fits[1].total):
             ends = " and ".join(f"{f.total:.0f}" for f in fits)
@@ -209,25 +230,40 @@ class Search:
             self._note(f"fits of {names} from two starts end at chi2 of {ends}; the less is used")
         return min(fits, key=lambda f: f.total) if fits else None
 
+    def _best_share(self, hypothesis: Hypothesis) -> float | None:
+        """The share of the linear coefficients that fits best as it stands; None: none can be."""
+        totals = {}
+        for share in SHARES:
+            try:
+                totals[share] = self._refit(hypothesis, share, rounds=0).total
+            except (MjchairError, np.linalg.LinAlgError):
+                continue
+        return min(totals, key=totals.__getitem__, default=None)
+
+    def _refit(self, hypothesis: Hypothesis, share: float, rounds: int = ROUNDS) -> Fitted:
+        """The nonlinear fit that begins at a share of the linear fit's coefficients."""
+        base = self.base
+        terms = hypotheses.terms(base.reduced, hypothesis, share)
+        start = replace(base.around.variant, terms=terms)
+        return refit(base.bench, start, base.around.track, base.nuisances, rounds)
+
     def _note(self, line: str) -> None:
         if line not in self.dropped:
             self.dropped.append(line)
 
     def _from(self, hypothesis: Hypothesis, share: float) -> Fitted | None:
         """The fit that begins at a share of the linear fit's coefficients."""
-        base = self.base
-        terms = hypotheses.terms(base.reduced, hypothesis, share)
-        start = replace(base.around.variant, terms=terms)
         try:
-            fitted = refit(base.bench, start, base.around.track, base.nuisances)
+            fitted = self._refit(hypothesis, share)
         except (MjchairError, np.linalg.LinAlgError) as error:
             self._note(f"{' and '.join(hypothesis.keys)} was not tried further: {error}")
             return None
-        moves = any(term.effect.measured for term in terms)
         walled = any(abs(by) >= bounded.WALL for by in fitted.variant.offsets.values())
-        if moves and walled:
+        if walled:
             fitted = self._around_terms(fitted)
-        if fitted.total > base.plain.total:
+        elif rules.is_stuck(total=fitted.total, promised=fitted.promised):
+            fitted = self.anew(fitted)
+        if fitted.total > self.base.plain.total:
             self._note(f"{' and '.join(hypothesis.keys)} fits worse than nothing and is left out")
             return None
         return fitted
@@ -235,8 +271,8 @@ class Search:
     def _around_terms(self, fitted: Fitted) -> Fitted:
         """The fit from the effects that were reached, what is roughly known as given; the better.
 
-        A rider who moves changes how a chair answers to its centre of mass or its inertia. Columns
-        that were made without the rider then push these numbers to the ends of what they may be.
+        A large effect changes how a chair answers to its centre of mass or its inertia. Columns
+        that were made without it then push these numbers to the ends of what they may be.
         """
         try:
             start = replace(fitted.variant, offsets={})
@@ -252,6 +288,10 @@ class Search:
         except (MjchairError, np.linalg.LinAlgError) as error:
             self.dropped.append(f"the last fit was not made anew: {error}")
             return fitted
+
+
+def _price(tried: Tried) -> float:
+    return tried.price
 
 
 def _believable(fitted: Fitted) -> bool:
@@ -292,10 +332,11 @@ def _freed(base: Base, hypothesis: Hypothesis, start: Start) -> Hypothesis:
     return weighed[min(richer, key=len)] if len(alike) > len(start.columns) else hypothesis
 
 
-def _not_ruled_out(rival: Tried, chosen: Tried) -> bool:
-    """Whether the data leave a rival standing."""
+def _not_ruled_out(rival: Tried, chosen: Tried, plain: float) -> bool:
+    """Whether the data leave a rival standing; `plain` is the chi2 without effects."""
     return rules.stays_a_rival(
         behind=rival.price - chosen.price,
+        gain=plain - chosen.fitted.total,
         errors=rules.paired_errors(rival.fitted.chi2, chosen.fitted.chi2),
         beyond_bound=bool(rival.fitted.at_bound and not chosen.fitted.at_bound),
     )
