@@ -24,6 +24,7 @@ from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
 from mjchair.errors import MjchairError
 
 TRIED = 3  # hypotheses of one size, where the first leaves a gap
+LISTED = 6  # hypotheses of one size, until one can be
 REFITTED = 5  # rivals of one effect
 SHARES = (0.875, 0.75, 0.625, 0.5, 0.375, 0.25, 0.125)  # of linear coefficients, for a new start
 SWAPS = 2  # times that a rival takes the place of the chosen hypothesis
@@ -126,6 +127,11 @@ class Search:
             more = self.believed(other)
             if more is not None and (top is None or more.price < top.price):
                 top = more
+        for other in options[:LISTED] if top is None else ():
+            # a favourite of linear algebra that cannot be says nothing of the others
+            top = self.believed(other)
+            if top is not None:
+                break
         if top is None:
             return None
         return top, left if top is tried else gap_after(self.base, top.fitted)
@@ -232,6 +238,8 @@ class Search:
 
     def _best_share(self, hypothesis: Hypothesis) -> float | None:
         """The share of the linear coefficients that fits best as it stands; None: none can be."""
+        if len(hypothesis.starts) > 1:  # a line through one effect's size is worth its rollouts
+            return 0.5
         totals = {}
         for share in SHARES:
             try:
