@@ -176,6 +176,9 @@ def test_what_an_answer_leaves_is_said():
             False,
         ),  # unless the limit was given
         ({"said": Verdict.AMBIGUOUS}, False),
+        # that something is there is certain, though not which of a set
+        ({"said": Verdict.AMBIGUOUS, "sigmas": rules.CERTAIN + 0.1}, True),
+        ({"said": Verdict.UNKNOWN, "sigmas": rules.CERTAIN + 0.1}, False),
     ],
 )
 def test_what_is_below_the_limit_does_not_matter(changes, matters):

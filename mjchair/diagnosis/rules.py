@@ -183,12 +183,13 @@ def matters(
     Args:
       force: the largest missing force, N. limit: below which none matters, N.
       gap: rms of the residual over the noise. told: whether the person who asks gave the limit.
-      sigmas: of the least certain effect. Without a limit that was told, what is CERTAIN is named
-        whatever its size, and a gap of twice the noise is one though no force goes with it.
+      sigmas: of the least certain effect. Without a limit that was told, what is CERTAIN
+        matters whatever its size, and a gap of twice the noise is one though no force goes with it.
     """
     if force >= limit or said == Verdict.NONE:
         return True
-    return not told and (gap >= SMALL_GAP or (said == Verdict.NAMED and sigmas > CERTAIN))
+    certain = said in (Verdict.NAMED, Verdict.AMBIGUOUS) and sigmas > CERTAIN
+    return not told and (gap >= SMALL_GAP or certain)
 
 
 def happened_once(gains: Array, runs: NDArray[np.int64]) -> bool:
