@@ -96,7 +96,7 @@ class Search:
 
     Attributes:
       base: around which. dropped: a line for each hypothesis that this chair cannot have.
-      tried: every fit that was made.
+      tried: every fit that was made. impossible: starts of those that this chair cannot have.
     """
 
     def __init__(self, base: Base, say: Say) -> None:
@@ -104,6 +104,7 @@ class Search:
         self.base, self.say = base, say
         self.dropped: list[str] = []
         self.tried: list[Rival] = []
+        self.impossible: list[tuple[Start, ...]] = []
 
     def best_of(self, options: Sequence[Hypothesis]) -> tuple[Tried, Gap] | None:
         """The best hypothesis with its fit, and the gap that it leaves; None: none can be.
@@ -208,9 +209,12 @@ class Search:
         known = next((t for t in self.tried if t.hypothesis.starts == hypothesis.starts), None)
         if known is not None:
             return Tried(hypothesis, known.fitted)
+        if hypothesis.starts in self.impossible:
+            return None
         self.say("fit of " + " and ".join(hypothesis.keys))
         fitted = self._best_start(hypothesis)
         if fitted is None:
+            self.impossible.append(hypothesis.starts)
             return None
         self.tried.append(Tried(hypothesis, fitted))
         return Tried(hypothesis, fitted)
