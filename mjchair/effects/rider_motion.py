@@ -96,6 +96,8 @@ def _swaying(sine: float, cosine: float, frequency: float) -> Values:
 
 SIGNATURE = "zero-mean fore-aft force at push frequency, with pitch"
 SOURCE = "head, arms and trunk are 0.68 of body mass (Winter 2009); sway of 2-10 cm"
+# weight over most other effects where a motion was measured, so that a person did move: assumption
+MOVES = 10.0
 HARMONIC = Effect(
     name="rider_motion",
     parameters=(
@@ -117,5 +119,6 @@ MEASURED = Effect(
     source=SOURCE,
     edit=measured,
     measured=MOTION,
+    common=MOVES,
     most=lambda spec: {"mass": moving_share.most(spec)},
 )

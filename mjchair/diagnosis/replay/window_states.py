@@ -27,6 +27,8 @@ from mjchair.simulation.initial import position_joints, start
 
 Array = NDArray[np.float64]
 ROUNDS = 2  # Gauss-Newton rounds a window
+MORE = 4  # further ones of a window whose last step still promised PROMISE, as where casters flip
+PROMISE = 4.0  # of misfit, in variances of the sensors' noise
 
 
 @dataclass
@@ -136,6 +138,21 @@ def track(
                 _fit_round(
                     simulator, chair, (model, coarse), errors, search, white, predicted, slow, kept
                 )
+            for _ in range(MORE):
+                restless = {i: s for i, s in search.items() if s.promise > PROMISE}
+                if not restless:
+                    break
+                _fit_round(
+                    simulator,
+                    chair,
+                    (model, coarse),
+                    errors,
+                    restless,
+                    white,
+                    predicted,
+                    slow,
+                    False,
+                )
             outcomes = _traced(simulator, model, [(i, search[i].state) for i in members])
             for i, outcome in outcomes.items():
                 w = simulator.windows[i]
@@ -164,13 +181,14 @@ class Search:
 
     Attributes:
       state: that was tried last. best, size: the best so far, and its misfit. change: from the
-        best to the one that was tried.
+        best to the one that was tried. promise: by how much that lessens the misfit, if linear.
     """
 
     state: State
     best: State
     size: float = np.inf
     change: Array = field(default_factory=lambda: np.zeros(len(SLOW)))
+    promise: float = 0.0
 
     def judge(self, size: float) -> bool:
         """Take the misfit of the state; False where it is worse than the best."""
@@ -227,20 +245,21 @@ def _fit_round(
             errors.applied(simulator, w, o.predicted) for o in outcomes[n * each : n * each + each]
         ]
         if not s.judge(_size(simulator, w, seen[0], white)):
-            s.change = 0.3 * s.change  # a step too far
+            s.change, s.promise = 0.3 * s.change, 0.3 * s.promise  # a step too far
             s.state = chair.moved(s.best, s.change)
             continue
         predicted[i] = seen[0]
         if not kept:
             slow[i] = np.stack([y - seen[1] for y in seen[2:]], axis=2)
-        s.change = _step(simulator, i, s.state, seen[0], slow[i], white) * STEPS
+        change, s.promise = _step(simulator, i, s.state, seen[0], slow[i], white)
+        s.change = change * STEPS
         s.state = chair.moved(s.state, s.change)
 
 
 def _step(
     simulator: WindowSimulator, i: int, state: State, seen: Array, slow: Array, white: Array
-) -> Array:
-    """Linear step of a window's slow state, in units of chair.STEPS, (7,)."""
+) -> tuple[Array, float]:
+    """Linear step of a window's slow state, in units of chair.STEPS, (7,), and what it promises."""
     miss = residual(simulator.measured(simulator.windows[i]), seen, simulator.channels)
     there = ~np.isnan(miss)
     columns = np.concatenate([slow, zero_columns(simulator)[None].repeat(len(miss), 0)], 2)
@@ -248,9 +267,10 @@ def _step(
     b = (miss / white)[there]
     spread = np.r_[prior(simulator, i, state) / STEPS, np.full(columns.shape[2] - len(SLOW), 1e4)]
     normal = a.T @ a + np.diag(1.0 / spread**2)
-    change = np.linalg.solve(normal, a.T @ b)[: len(SLOW)]
+    whole = np.linalg.solve(normal, a.T @ b)
+    change, promise = whole[: len(SLOW)], float(whole @ (a.T @ b))
     # shortened, never turned
-    return np.asarray(change * min(1.0, 20.0 / max(np.abs(change).max(), 1e-9)))
+    return np.asarray(change * min(1.0, 20.0 / max(np.abs(change).max(), 1e-9))), promise
 
 
 def zero_columns(simulator: WindowSimulator) -> Array:
