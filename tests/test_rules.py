@@ -255,11 +255,6 @@ def test_a_rival_is_fitted_where_linear_algebra_leaves_it_near():
     assert not rules.worth_refitting(behind=310.0, gain=10_000.0, rival_gain=0.0)
 
 
-def test_linear_algebra_is_enough_where_its_errors_decide_nothing():
-    assert rules.linear_is_enough(300.0)
-    assert not rules.linear_is_enough(400.0)
-
-
 def test_a_fit_is_stuck_where_its_own_step_promises_what_decides():
     assert not rules.is_stuck(total=1009.0, promised=1000.0)
     assert rules.is_stuck(total=1011.0, promised=1000.0)

@@ -258,11 +258,6 @@ def can_be_dropped(*, lost: float, parameters: int) -> bool:
     return lost < needed(parameters)
 
 
-def linear_is_enough(gain: float) -> bool:
-    """Whether what linear algebra gets wrong of a fit with this gain is below what decides."""
-    return LINEAR * gain < RIVAL_CHI2
-
-
 def alike(score: float, best: float) -> bool:
     """Whether two hypotheses fit alike, by their scores (chi2 gained less penalties)."""
     return score > best - TIE

@@ -129,13 +129,13 @@ def screen_columns(
 def _with_noise_left(base: Base) -> Base:
     """The base with the noise that its best hypothesis leaves.
 
-    Where it gains much, it is fitted first: what linear algebra gets wrong of a large effect would
-    pass for noise.
+    Where it gains enough to be added to an answer, it is fitted first: what linear algebra gets
+    wrong of an effect would pass for noise, and noise hides how large the effect is.
     """
     best = _best(base.reduced, base.starts)
     bench, here = base.bench, base.around.track
     own: dict[ColumnId, Column] = {c: base.columns[c] for c in best.columns} if best else {}
-    if best is not None and not rules.linear_is_enough(best.gain):
+    if best is not None and best.gain > rules.needed(best.free):
         start = replace(base.around.variant, terms=hypotheses.terms(base.reduced, best))
         try:
             fitted = refit(bench, start, here, base.nuisances)
