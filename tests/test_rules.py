@@ -251,8 +251,8 @@ def test_a_rival_is_fitted_where_linear_algebra_leaves_it_near():
     assert not rules.worth_refitting(behind=34.0, gain=150.0, rival_gain=121.0)
     assert not rules.worth_refitting(behind=30.0, gain=150.0, rival_gain=119.0)  # 80 % of the gain
     # what linear algebra gets wrong of a large gain is larger than what decides
-    assert rules.worth_refitting(behind=290.0, gain=10_000.0, rival_gain=0.0)
-    assert not rules.worth_refitting(behind=310.0, gain=10_000.0, rival_gain=0.0)
+    assert rules.worth_refitting(behind=990.0, gain=10_000.0, rival_gain=0.0)
+    assert not rules.worth_refitting(behind=1010.0, gain=10_000.0, rival_gain=0.0)
 
 
 def test_a_fit_is_stuck_where_its_own_step_promises_what_decides():

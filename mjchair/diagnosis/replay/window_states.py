@@ -138,8 +138,12 @@ def track(
                 _fit_round(
                     simulator, chair, (model, coarse), errors, search, white, predicted, slow, kept
                 )
-            for _ in range(MORE):
-                restless = {i: s for i, s in search.items() if s.promise > PROMISE}
+            for _ in range(0 if kept else MORE):
+                restless = {
+                    i: s
+                    for i, s in search.items()
+                    if s.promise > PROMISE and not chair.stands(s.state)
+                }
                 if not restless:
                     break
                 _fit_round(
@@ -151,7 +155,7 @@ def track(
                     white,
                     predicted,
                     slow,
-                    False,
+                    kept,
                 )
             outcomes = _traced(simulator, model, [(i, search[i].state) for i in members])
             for i, outcome in outcomes.items():
