@@ -57,7 +57,8 @@ def summary(folder: Path) -> str:
     """Verdict and gap of a diagnosis, on one line."""
     found = json.loads((folder / "diagnosis.json").read_text())
     gap = found["gap"]
-    return f"{folder.name}: {found['verdict']}, gap {gap['before']:.2f} -> {gap['after']:.2f}"
+    after = "" if gap["after"] is None else f" -> {gap['after']:.2f}"  # none where nothing is named
+    return f"{folder.name}: {found['verdict']}, gap {gap['before']:.2f}{after}"
 
 
 if __name__ == "__main__":
