@@ -37,7 +37,7 @@ from mjchair.errors import MjchairError
 
 Say = Callable[[str], None]
 NEAR = 0.5  # prior standard deviations that columns of nuisances are good for
-SEEN = 1.0
+SEEN = 1.0  # sigmas that one standard deviation of a nuisance changes
 FAR = 2.5  # prior standard deviations: a nuisance there is not what moved
 AT_REST = 0.01  # m/s^2, bias of an accelerometer that was seen at rest
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from mjchair.diagnosis.explain.left_out import held_out, with_terms
 from mjchair.diagnosis.explain.screening import Base, Say, gap_after
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
+from mjchair.diagnosis.fit.variant import Variant
+from mjchair.diagnosis.replay.window_states import Track
 from mjchair.errors import MjchairError
 
 TRIED = 3  # hypotheses of one size, where the first leaves a gap
@@ -128,11 +131,9 @@ class Search:
             more = self.believed(other)
             if more is not None and (top is None or more.price < top.price):
                 top = more
-        for other in options[:LISTED] if top is None else ():
-            # a favourite of linear algebra that cannot be says nothing of the others
-            top = self.believed(other)
-            if top is not None:
-                break
+        if top is None:  # a favourite of linear algebra that cannot be says nothing of the others
+            fits = (self.believed(other) for other in options[:LISTED])
+            top = next((fit for fit in fits if fit is not None), None)
         if top is None:
             return None
         return top, left if top is tried else gap_after(self.base, top.fitted)
@@ -176,7 +177,11 @@ class Search:
         rivals = self.rivals(chosen)
         for _ in range(SWAPS):
             others = [Tried(r.hypothesis, r.fitted) for group in rivals for r in group]
-            better = min((o for o in others if _believable(o.fitted)), key=_price, default=chosen)
+            better = min(
+                (o for o in others if _believable(o.fitted)),
+                key=attrgetter("price"),
+                default=chosen,
+            )
             if better.price >= chosen.price:
                 break
             chosen = self.without_needless(better)
@@ -257,15 +262,12 @@ class Search:
             if term.effect.key not in taken
         ]
         start = replace(part.variant, terms=(*part.variant.terms, *more))
-        try:
-            again = refit(self.base.bench, start, part.track)
-        except (MjchairError, np.linalg.LinAlgError):
-            return fitted
-        return again if fitted is None else min(fitted, again, key=lambda f: f.total)
+        fits = [f for f in (fitted, self._made_anew(start, part.track)) if f is not None]
+        return min(fits, key=lambda f: f.total, default=None)
 
     def _best_share(self, hypothesis: Hypothesis) -> float | None:
         """The share of the linear coefficients that fits best as it stands; None: none can be."""
-        if len(hypothesis.starts) > 1:  # a line through one effect's size is worth its rollouts
+        if len(hypothesis.starts) > 1:  # the simulations are worth it for a single effect only
             return 0.5
         totals = {}
         for share in SHARES:
@@ -297,7 +299,7 @@ class Search:
         if walled:
             fitted = self._around_terms(fitted)
         elif rules.is_stuck(total=fitted.total, promised=fitted.promised):
-            fitted = self.anew(fitted)
+            fitted = self._made_anew(fitted.variant, fitted.track) or fitted
         if fitted.total > self.base.plain.total:
             self._note(f"{' and '.join(hypothesis.keys)} fits worse than nothing and is left out")
             return None
@@ -309,24 +311,25 @@ class Search:
         A large effect changes how a chair answers to its centre of mass or its inertia. Columns
         that were made without it then push these numbers to the ends of what they may be.
         """
-        try:
-            start = replace(fitted.variant, offsets={})
-            again = refit(self.base.bench, start, fitted.track)
-        except (MjchairError, np.linalg.LinAlgError):
-            return fitted
-        return min(fitted, again, key=lambda f: f.total)
+        again = self._made_anew(replace(fitted.variant, offsets={}), fitted.track)
+        return fitted if again is None else min(fitted, again, key=lambda f: f.total)
 
     def anew(self, fitted: Fitted) -> Fitted:
         """The fit with everything made anew around it; the fit itself where that cannot be."""
+        return self._made_anew(fitted.variant, fitted.track, "the last fit") or fitted
+
+    def _made_anew(self, start: Variant, before: Track, noted: str = "") -> Fitted | None:
+        """The fit from a variant, all columns made there; None: no chair can be so.
+
+        Args:
+          noted: what the note calls it where that fails; empty: no note.
+        """
         try:
-            return refit(self.base.bench, fitted.variant, fitted.track)
+            return refit(self.base.bench, start, before)
         except (MjchairError, np.linalg.LinAlgError) as error:
-            self.dropped.append(f"the last fit was not made anew: {error}")
-            return fitted
-
-
-def _price(tried: Tried) -> float:
-    return tried.price
+            if noted:
+                self._note(f"{noted} was not made anew: {error}")
+            return None
 
 
 def _believable(fitted: Fitted) -> bool:

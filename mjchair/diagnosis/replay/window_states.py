@@ -134,28 +134,15 @@ def track(
         for index in sorted(by_index):
             members = by_index[index]
             search = {i: Search(states[i], states[i]) for i in members}
-            for _ in range(ROUNDS):
-                _fit_round(
-                    simulator, chair, (model, coarse), errors, search, white, predicted, slow, kept
-                )
-            for _ in range(0 if kept else MORE):
-                restless = {
-                    i: s
-                    for i, s in search.items()
-                    if s.promise > PROMISE and not chair.stands(s.state)
-                }
-                if not restless:
+            going = search
+            # answers that are kept from another chair would lead further rounds astray
+            for round_ in range(ROUNDS if kept else ROUNDS + MORE):
+                if round_ >= ROUNDS:
+                    going = {i: s for i, s in search.items() if _promising(chair, s)}
+                if not going:
                     break
                 _fit_round(
-                    simulator,
-                    chair,
-                    (model, coarse),
-                    errors,
-                    restless,
-                    white,
-                    predicted,
-                    slow,
-                    kept,
+                    simulator, chair, (model, coarse), errors, going, white, predicted, slow, kept
                 )
             outcomes = _traced(simulator, model, [(i, search[i].state) for i in members])
             for i, outcome in outcomes.items():
@@ -200,6 +187,11 @@ class Search:
             return False
         self.best, self.size = self.state, size
         return True
+
+
+def _promising(chair: Chair, search: Search) -> bool:
+    """Whether a further round is worth it; a chair at rest answers in steps, not in slopes."""
+    return search.promise > PROMISE and not chair.stands(search.state)
 
 
 def _traced(

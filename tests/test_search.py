@@ -1,0 +1,95 @@
+"""The search for effects, with fits that are told instead of simulated.
+
+In: totals (chi2) of fits, given by name. Out: which fit the search takes.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from mjchair.diagnosis.explain import search
+from mjchair.diagnosis.explain.hypotheses import Hypothesis
+from mjchair.diagnosis.fit.variant import Variant
+from mjchair.errors import MjchairError
+
+
+def effect(name):
+    return SimpleNamespace(effect=SimpleNamespace(key=name), free=("size",))
+
+
+ROLLING, MOTOR = effect("rolling"), effect("motor")
+ONE = Hypothesis((ROLLING,), gain=500.0, score=490.0)
+BOTH = Hypothesis((ROLLING, MOTOR), gain=900.0, score=880.0)
+
+
+def fit(total, *keys, promised=None):
+    terms = tuple(SimpleNamespace(effect=SimpleNamespace(key=k)) for k in keys)
+    return SimpleNamespace(
+        total=total,
+        promised=total if promised is None else promised,
+        variant=Variant((), terms=terms),
+        track=f"track of {'+'.join(keys)}",
+    )
+
+
+@pytest.fixture
+def fits(monkeypatch):
+    """Fits as `refit` is asked for them; each answers (start, before, nuisances) with a fit."""
+    asked, answers = [], {}
+
+    def refit(bench, start, before, nuisances=None, rounds=search.ROUNDS):
+        keys = "+".join(sorted(t.effect.key for t in start.terms))
+        asked.append((keys, before))
+        answer = answers[keys, before]
+        if answer is None:
+            raise MjchairError("no chair")
+        return answer
+
+    def terms(reduced, hypothesis, share=1.0):
+        return tuple(SimpleNamespace(effect=s.effect) for s in hypothesis.starts)
+
+    monkeypatch.setattr(search, "refit", refit)
+    monkeypatch.setattr(search.hypotheses, "terms", terms)
+    return SimpleNamespace(asked=asked, answers=answers)
+
+
+def searching():
+    base = SimpleNamespace(
+        bench=None,
+        nuisances={},
+        plain=SimpleNamespace(total=2000.0),
+        reduced=SimpleNamespace(total=2000.0),
+        around=SimpleNamespace(track="as given", variant=Variant(())),
+    )
+    return search.Search(base, lambda line: None)
+
+
+def test_two_effects_that_fit_worse_than_one_start_again_from_it(fits):
+    fits.answers.update(
+        {
+            ("rolling", "as given"): fit(1500.0, "rolling"),
+            ("motor+rolling", "as given"): fit(1600.0, "rolling", "motor"),
+            ("motor+rolling", "track of rolling"): fit(1110.0, "rolling", "motor"),
+        }
+    )
+    looking = searching()
+    assert looking.fit(ONE).fitted.total == 1500.0
+    assert looking.fit(BOTH).fitted.total == 1110.0
+
+
+def test_what_cannot_be_is_tried_once(fits):
+    fits.answers[("rolling", "as given")] = None
+    looking = searching()
+    assert looking.fit(ONE) is None
+    tries = len(fits.asked)
+    assert looking.fit(ONE) is None
+    assert len(fits.asked) == tries
+    assert looking.dropped == ["rolling was not tried further: no chair"]
+
+
+def test_a_fit_that_still_promises_is_made_anew(fits):
+    fits.answers[("rolling", "as given")] = fit(1530.0, "rolling", promised=1500.0)
+    fits.answers[("rolling", "track of rolling")] = fit(1501.0, "rolling")
+    assert searching().fit(ONE).fitted.total == 1501.0
