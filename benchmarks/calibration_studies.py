@@ -155,12 +155,12 @@ def make_study(made: Made, folder: Path) -> dict:
 
 def _practice(folder: Path, name: str, trials: int) -> dict:
     folder.mkdir(parents=True, exist_ok=True)
-    whole = practice.runs
-    practice.runs = lambda: whole()[:trials]  # type: ignore[assignment]
+    whole = practice.manoeuvres
+    practice.manoeuvres = lambda: whole()[:trials]  # type: ignore[assignment]
     try:
         files = practice.hide(find(name), seed=SEED, model="power")
     finally:
-        practice.runs = whole
+        practice.manoeuvres = whole
     for file, content in files.items():
         path = folder / file
         if isinstance(content, bytes):

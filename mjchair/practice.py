@@ -12,15 +12,18 @@ import io
 import json
 import zlib
 from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import tomli_w
 
 from mjchair.effects import user_file
 from mjchair.effects.effect import Effect
 from mjchair.errors import MjchairError
+from mjchair.model.load import Load, strap
 from mjchair.model.parameters import ChairParameters
 from mjchair.model.spec import load_spec
 from mjchair.simulation.inputs import Inputs, push_strokes
@@ -30,6 +33,7 @@ from mjchair.simulation.simulate import simulate
 SEAL = "answer.sealed"
 HELD_OUT = "push"  # no fit sees it; what is left turns in two ways and rolls in three
 RATE, SECONDS = 100.0, 6.0  # Hz, s
+LOAD = Load(mass=20.0, height=0.55)  # on the seat
 TURNS_OVER = 4.0  # s, until which a chair that rolled backward is driven forward
 NOISE = {  # SI; sizes of encoders, a small IMU and motion capture; assumed
     "left_wheel_speed": 0.05,
@@ -69,22 +73,32 @@ def _spin() -> Inputs:
     return Inputs(time, {"left_wheel": -turn, "right_wheel": turn}, "spin")
 
 
-def runs() -> list[tuple[str, dict[str, object], Inputs | None]]:
-    """The manoeuvres: word, how it starts, what drives it.
+@dataclass(frozen=True)
+class Manoeuvre:
+    """One run: a word for it, how it starts, what drives it, and what is strapped to the seat."""
+
+    word: str
+    initial: dict[str, object]
+    inputs: Inputs | None = None
+    load: Load | None = None
+
+
+def manoeuvres() -> list[Manoeuvre]:
+    """The runs of a practice study.
 
     Together they tell apart what looks alike in a coast: a fast one shows air, one each way a
-    slope, a turn on the spot toe, and casters that turn over show bearings of the rear wheels,
-    since rolling resistance acts on the casters as well.
+    slope, a turn on the spot toe, and a load the bearings, which do not feel it.
     """
     strokes = push_strokes({"left_wheel": 12.0, "right_wheel": 12.0}, SECONDS)
+    there, back = ({"heading": h, "position": (x, 0.0)} for h, x in ((0.0, 0.0), (np.pi, 6.0)))
     return [
-        ("coast", {"speed": 2.8, "heading": 0.0, "position": (0.0, 0.0)}, None),
-        ("coast", {"speed": 1.4, "heading": np.pi, "position": (6.0, 0.0)}, None),
-        ("turn", {"speed": 1.0, "heading": 0.5, "yaw_rate": 0.6}, _turn()),
-        ("push", {"speed": 0.8, "heading": 1.2}, strokes),
-        ("slalom", {"speed": 1.0, "heading": -0.6}, _slalom()),
-        ("reverse", {"speed": -0.5, "heading": 2.2, "yaw_rate": 0.2}, _reverse()),
-        ("spin", {"heading": -1.5}, _spin()),
+        Manoeuvre("coast", {"speed": 2.8, **there}),
+        Manoeuvre("coast", {"speed": 1.4, **back}, load=LOAD),
+        Manoeuvre("turn", {"speed": 1.0, "heading": 0.5, "yaw_rate": 0.6}, _turn()),
+        Manoeuvre("push", {"speed": 0.8, "heading": 1.2}, strokes),
+        Manoeuvre("slalom", {"speed": 1.0, "heading": -0.6}, _slalom()),
+        Manoeuvre("reverse", {"speed": -0.5, "heading": 2.2, "yaw_rate": 0.2}, _reverse()),
+        Manoeuvre("spin", {"heading": -1.5}, _spin()),
     ]
 
 
@@ -123,18 +137,28 @@ def hide(
     if chair.given():
         study["chair"] = dict(chair.given())
     study |= {"noise": NOISE, "trial": []}
-    for k, (word, initial, inputs) in enumerate(runs()):
-        recording = simulate(
-            spec, inputs, SECONDS, initial=initial, timestep=0.001, sample_rate=RATE
-        )
-        file = f"{word}_{k}.csv"
-        files[file] = _table(recording, inputs, rng)
-        held = {"hold_out": True} if word == HELD_OUT else {}
-        study["trial"].append({"file": file, "manoeuvre": word, **held})
+    for k, made in enumerate(manoeuvres()):
+        file = f"{made.word}_{k}.csv"
+        files[file] = _table(_run(spec, made), made.inputs, rng)
+        entry: dict[str, Any] = {"file": file, "manoeuvre": made.word}
+        if made.word == HELD_OUT:
+            entry["hold_out"] = True
+        if made.load is not None:
+            entry["load"] = asdict(made.load)
+        study["trial"].append(entry)
     files["study.toml"] = tomli_w.dumps(study)
     answer = json.dumps({"effect": effect.name, "channel": effect.channel, "values": chosen})
     files[SEAL] = base64.b64encode(zlib.compress(answer.encode()))
     return files
+
+
+def _run(spec: mujoco.MjSpec, made: Manoeuvre) -> Recording:
+    chair = spec.copy()
+    if made.load is not None:
+        strap(chair, made.load)
+    return simulate(
+        chair, made.inputs, SECONDS, initial=made.initial, timestep=0.001, sample_rate=RATE
+    )
 
 
 def reveal(folder: Path) -> dict[str, object]:

@@ -26,6 +26,8 @@ WORDS = {
     "array": "a list",
     "object": "a table",
 }
+LIMITS = {" of length": " of {} numbers", " >=": " of at least {}", " <=": " of at most {}"}
+_LIMIT = re.compile(rf"({'|'.join(LIMITS)}) (-?\d+(?:\.[1-9]\d*)?)")
 _PLACE = re.compile(r" - at `\$(?P<path>.*)`$")
 _STEP = re.compile(r"\.(?P<field>\w+)|\[(?P<index>\d+|\.\.\.)\]")
 _EXPECTED = re.compile(r"^Expected `(?P<types>[^`]*)`(?P<rest>.*)")
@@ -118,8 +120,8 @@ def _rule(said: str, name: str) -> str:
     if expected["types"] == "array" and "got `object`" in rest:
         return f"[[{name}]], with two brackets"
     words = [WORDS.get(t, t) for t in expected["types"].split(" | ") if t != "null"]
-    limit = re.match(r" of length (\d+)", rest)
-    return " or ".join(words) + (f" of {limit[1]} numbers" if limit else "")
+    limit = _LIMIT.match(rest)
+    return " or ".join(words) + (LIMITS[limit[1]].format(limit[2]) if limit else "")
 
 
 def _culprit(

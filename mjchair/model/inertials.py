@@ -65,6 +65,12 @@ def of_body(body: Any) -> Inertial:
     return Inertial(float(body.mass), np.array(body.ipos, float), _turned(body.inertia, body.iquat))
 
 
+def of_compiled(model: mujoco.MjModel, body: int) -> Inertial:
+    """The inertial of a body of a compiled model, in the body's frame."""
+    tensor = _turned(model.body_inertia[body], model.body_iquat[body])
+    return Inertial(float(model.body_mass[body]), model.body_ipos[body].copy(), tensor)
+
+
 def of_geoms(geoms: Iterable[Any]) -> Inertial:
     """The sum of all solid geoms that have a mass, in the frame of their body."""
     alone = mujoco.MjSpec()
@@ -82,9 +88,7 @@ def of_geoms(geoms: Iterable[Any]) -> Inertial:
         )
     if not weighed:
         return NOTHING
-    model = alone.compile()
-    tensor = _turned(model.body_inertia[1], model.body_iquat[1])
-    return Inertial(float(model.body_mass[1]), model.body_ipos[1].copy(), tensor)
+    return of_compiled(alone.compile(), 1)
 
 
 def explicit(spec: mujoco.MjSpec, name: str) -> Any:
@@ -107,11 +111,10 @@ def explicit(spec: mujoco.MjSpec, name: str) -> Any:
     return body
 
 
-def set_tensor(body: Any, tensor: Array) -> None:
-    """Write an inertia (3, 3) kg m^2 about the centre of mass, in the body's axes.
+def principal(tensor: Array) -> tuple[Array, Array]:
+    """Axes, as a quaternion (4,), and principal moments (3,) kg m^2 of an inertia (3, 3).
 
-    Removing a mass may leave an inertia that no real body has; then the nearest valid one is
-    written.
+    Removing a mass may leave an inertia that no real body has; then the nearest valid one's.
     """
     values, axes = np.linalg.eigh(tensor)
     values = np.maximum(values, 1e-6)
@@ -120,7 +123,12 @@ def set_tensor(body: Any, tensor: Array) -> None:
         axes[:, 0] *= -1.0
     quat = np.zeros(4)
     mujoco.mju_mat2Quat(quat, axes.ravel())
-    body.iquat, body.inertia = quat, values
+    return quat, values
+
+
+def set_tensor(body: Any, tensor: Array) -> None:
+    """Write an inertia (3, 3) kg m^2 about the centre of mass, in the body's axes."""
+    body.iquat, body.inertia = principal(tensor)
 
 
 def write(body: Any, inertial: Inertial) -> None:

@@ -14,6 +14,7 @@ import mujoco
 from mjchair.diagnosis.data import trial_checks, unit_checks
 from mjchair.errors import MjchairError
 from mjchair.measurement.trial import Trial, check_columns
+from mjchair.model.load import Load
 from mjchair.model.rolling import RearAxle, rear_axle
 from mjchair.simulation.initial import Initial
 
@@ -26,6 +27,7 @@ class Run:
       trial: the samples, SI. manoeuvre: word that groups runs.
       hold_out: kept for the final check. initial: what is known of the first sample; fields that
         were not given are estimated. given: names of the fields that were given.
+      load: that was strapped to the chair for this run; None: none.
     """
 
     trial: Trial
@@ -33,6 +35,7 @@ class Run:
     hold_out: bool
     initial: Initial
     given: frozenset[str]
+    load: Load | None = None
 
     @property
     def duration(self) -> float:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 import mujoco
 import numpy as np
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, structs
 
 from mjchair.diagnosis.data import unit_checks
 from mjchair.diagnosis.data.study import Run, Study, make_study
@@ -20,6 +20,7 @@ from mjchair.errors import MjchairError, nearest
 from mjchair.measurement import baseline as baselines
 from mjchair.measurement import smartwheel
 from mjchair.measurement.trial import Trial, read_trial
+from mjchair.model.load import Load
 from mjchair.model.parameters import ChairParameters
 from mjchair.model.spec import load_spec
 from mjchair.rider.rider import RIDERS
@@ -29,6 +30,7 @@ from mjchair.toml_file import read_toml
 FILE = "study.toml"
 BETWEEN = ("straight", "hold")  # of two samples of an input
 SIDES = ("left", "right")
+HEAVIEST = 250.0  # kg, of a load
 Positive = Annotated[float, Meta(gt=0)]
 
 
@@ -45,6 +47,14 @@ class InitialEntry(Struct, forbid_unknown_fields=True):
         return {f: v for f in self.__struct_fields__ if (v := getattr(self, f)) is not None}
 
 
+class LoadEntry(Struct, forbid_unknown_fields=True):
+    """[trial.load]: what was strapped to the chair for this run, as in `Load`."""
+
+    mass: Annotated[float, Meta(gt=0, le=HEAVIEST)]
+    height: Annotated[float, Meta(ge=0, le=2)]
+    forward: Annotated[float, Meta(ge=-1, le=1)] = 0.0
+
+
 class TrialEntry(Struct, forbid_unknown_fields=True):
     """One [[trial]]: its table, its manoeuvre, and what is known of its start."""
 
@@ -55,6 +65,7 @@ class TrialEntry(Struct, forbid_unknown_fields=True):
     smartwheel: str | None = None
     baseline: str | None = None
     inputs: str | None = None
+    load: LoadEntry | None = None
 
 
 class ProcessEntry(Struct, forbid_unknown_fields=True):
@@ -205,7 +216,9 @@ def _runs(entry: StudyEntry, path: Path, model: mujoco.MjModel) -> list[Run]:
             )
         given = told.initial.given() if told.initial is not None else {}
         unit_checks.check_initial(given, trial.name)
-        runs.append(Run(trial, told.manoeuvre, told.hold_out, Initial(**given), frozenset(given)))
+        load = None if told.load is None else Load(**structs.asdict(told.load))
+        initial = Initial(**given)
+        runs.append(Run(trial, told.manoeuvre, told.hold_out, initial, frozenset(given), load))
     return runs
 
 

@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 
 from mjchair.diagnosis.data import first_state
 from mjchair.diagnosis.data.study import Study
+from mjchair.model.load import Load
 from mjchair.simulation.initial import Initial
 from mjchair.simulation.inputs import Inputs
 
 Array = NDArray[np.float64]
 Torque = Callable[[Array], tuple[Array, Array]]
 SECONDS = 6.0  # of a manoeuvre
-LOAD = 15.0  # kg, on the seat
+LOAD = Load(mass=15.0, height=0.55)  # on the seat, above the rear axle
 GRID = 0.01  # s, between samples of a torque
 COAST = 1.8  # m/s
 
@@ -32,7 +33,7 @@ class Manoeuvre:
       name: short. words: what to do, for a person who owns the chair.
       speed: at the start, m/s. turned: heading against the study's, rad. yaw_rate: rad/s.
       torque: time (s) -> left and right torque as shares of the study's largest; None: a coast.
-      shift: of the start, m, ahead and to the left. loaded: with LOAD on the seat.
+      shift: of the start, m, ahead and to the left. load: that is strapped to the seat.
       seconds: how long, s.
     """
 
@@ -43,7 +44,7 @@ class Manoeuvre:
     yaw_rate: float = 0.0
     torque: Torque | None = None
     shift: tuple[float, float] = (0.0, 0.0)
-    loaded: bool = False
+    load: Load | None = None
     seconds: float = SECONDS
 
 
@@ -140,7 +141,7 @@ def _circle(time: Array) -> tuple[Array, Array]:
     return np.full_like(time, 0.05), np.full_like(time, 0.25)
 
 
-_SEAT = f" with {LOAD:g} kg more on the seat, strapped down above the axle"
+_SEAT = f" with {LOAD.mass:g} kg more on the seat, strapped down above the rear axle"
 LIBRARY = (  # simplest first
     Manoeuvre("stand", "Let it stand with everything recording, brakes off, hands off"),
     Manoeuvre("coast", "Coast as before, from 1.8 m/s, hands off the wheels", COAST),
@@ -181,19 +182,19 @@ LIBRARY = (  # simplest first
     Manoeuvre(
         "circle", "Drive a steady circle to the left at 1 m/s", 1.0, yaw_rate=0.5, torque=_circle
     ),
-    Manoeuvre("loaded coast", "Coast from 1.8 m/s" + _SEAT, COAST, loaded=True),
+    Manoeuvre("loaded coast", "Coast from 1.8 m/s" + _SEAT, COAST, load=LOAD),
     Manoeuvre(
         "loaded coast in a turn",
         "Coast from 1.3 m/s in a turn to the left" + _SEAT,
         1.3,
         yaw_rate=0.6,
-        loaded=True,
+        load=LOAD,
     ),
     Manoeuvre(
         "loaded slalom",
         "Drive a slalom, 4 s a wave," + _SEAT,
         1.0,
         torque=_slalom(0.25),
-        loaded=True,
+        load=LOAD,
     ),
 )

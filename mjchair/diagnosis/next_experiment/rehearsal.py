@@ -19,7 +19,7 @@ from mjchair.diagnosis.fit.column_ids import RoughlyKnown
 from mjchair.diagnosis.fit.nonlinear import Fitted, moved
 from mjchair.diagnosis.fit.variant import Variant
 from mjchair.diagnosis.fit.whitening import Whitener
-from mjchair.diagnosis.next_experiment.manoeuvres import LOAD, Manoeuvre, Setting
+from mjchair.diagnosis.next_experiment.manoeuvres import Manoeuvre, Setting
 from mjchair.diagnosis.replay.chair_state import SLOW, STEPS, State
 from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.sensor_errors import SensorErrors
@@ -28,11 +28,9 @@ from mjchair.diagnosis.replay.window_states import Track
 from mjchair.effects.effect import SensorError
 from mjchair.engine.install import installed
 from mjchair.measurement.trial import Trial
-from mjchair.model import inertials
 from mjchair.simulation.initial import start
 
 Array = NDArray[np.float64]
-SEAT = 0.55  # m, height of the load
 TIPPED = 0.8  # of the chair's up axis along the vertical: less is a chair that falls
 FASTEST = 10.0  # m/s, beyond which it is no chair
 # a chair that coasts backwards is not stable: what begins with 0.02 rad/s more may end elsewhere,
@@ -126,25 +124,17 @@ class Rehearsal:
         ]
         self.longer = WindowSimulator(study, windows)
 
-    def model(self, chair: Version, run: int) -> mujoco.MjModel:
-        """The chair's coarse model, with the load where the manoeuvre has it."""
-        load = self.manoeuvres[run].loaded
-        key = (chair.mechanics, load)
-
-        def edit(spec: mujoco.MjSpec) -> None:
-            chair.variant.edit(spec)
-            if load:
-                _load(spec)
-
-        if key not in self.known:
-            self.known[key] = self.simulator.compile(edit, coarse=True)
-        return self.known[key]
+    def model(self, chair: Version) -> mujoco.MjModel:
+        """The chair's coarse model."""
+        if chair.mechanics not in self.known:
+            self.known[chair.mechanics] = self.simulator.compile(chair.variant.edit, coarse=True)
+        return self.known[chair.mechanics]
 
     def _starts(self, chair: Version) -> list[State]:
         out = []
         with installed():
             for i, run in enumerate(self.simulator.study.runs):
-                model = self.model(chair, i)
+                model = self.simulator.in_run(self.model(chair), i)
                 data = start(model, run.initial)
                 trace = {"qpos": data.qpos[None], "qvel": data.qvel[None], "act": data.act[None]}
                 out.append(self.simulator.carrier.back(model, trace, 0))
@@ -153,10 +143,7 @@ class Rehearsal:
     def _open_loop(self, chair: Version, states: Sequence[State]) -> list[dict[str, Array]]:
         """Traces of whole runs."""
         windows = self.longer.windows
-        jobs = [
-            Job(self.model(chair, i), w, s)
-            for i, (w, s) in enumerate(zip(windows, states, strict=True))
-        ]
+        jobs = [Job(self.model(chair), w, s) for w, s in zip(windows, states, strict=True)]
         return [o.trace for o in self.longer.run(jobs, trace=True)]
 
     def _nudged(self, chair: Version) -> list[dict[str, Array]]:
@@ -176,7 +163,7 @@ class Rehearsal:
     def whole(self, chair: Version, which: int) -> Array:
         """What the channels of a chair show of one whole manoeuvre, (samples, channels)."""
         window = self.longer.windows[which]
-        job = Job(self.model(chair, which), window, self.first[which])
+        job = Job(self.model(chair), window, self.first[which])
         outcome = self.longer.run([job])[0]
         seen = chair.sensor_errors(self.longer.channels)
         return seen.applied(self.longer, window, outcome.predicted)
@@ -185,7 +172,7 @@ class Rehearsal:
         simulator = self.simulator
         states = []
         for w in simulator.windows:
-            model = self.model(chair, w.run)
+            model = simulator.in_run(self.model(chair), w.run)
             at = round(w.start / model.opt.timestep) - 1
             first = w.index == 0
             states.append(
@@ -207,7 +194,7 @@ class Rehearsal:
         simulator = self.simulator
         different = {c.mechanics: c for c in chairs}
         jobs = [
-            Job(self.model(c, w.run), w, s)
+            Job(self.model(c), w, s)
             for c in different.values()
             for w, s in zip(simulator.windows, states, strict=True)
         ]
@@ -222,12 +209,6 @@ class Rehearsal:
         ]
 
 
-def _load(spec: mujoco.MjSpec) -> None:
-    """Strap LOAD to the seat, above the centre of mass."""
-    body = inertials.explicit(spec, "chair")
-    inertials.add_mass(body, LOAD, np.array([body.ipos[0], body.ipos[1], SEAT]))
-
-
 def _step(study: Study) -> float:
     """Median time between samples, s."""
     return float(np.median([np.median(np.diff(r.trial.time)) for r in study.runs]))
@@ -238,4 +219,5 @@ def _planned(study: Study, setting: Setting, manoeuvre: Manoeuvre, every: float)
     time = np.arange(0.0, manoeuvre.seconds, every)
     channels = {c: np.zeros(time.size) for c in study.channels}
     trial = Trial(manoeuvre.name, time, channels, setting.inputs(manoeuvre), {})
-    return Run(trial, manoeuvre.name, False, setting.initial(manoeuvre), frozenset())
+    initial = setting.initial(manoeuvre)
+    return Run(trial, manoeuvre.name, False, initial, frozenset(), manoeuvre.load)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import mujoco
 import numpy as np
@@ -24,6 +24,7 @@ from mjchair.diagnosis.replay.sampling import places, sampled
 from mjchair.diagnosis.replay.state_transfer import StateCarrier
 from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
+from mjchair.model.load import loaded
 from mjchair.model.visual_geoms import without_visual_geoms
 from mjchair.model.wheels import COMFORTABLE, check_timestep, cut_damping
 from mjchair.simulation import batch, names
@@ -37,7 +38,8 @@ class Job:
     """One window of one model.
 
     Attributes:
-      model: what is simulated. window: which. state: at the window's start, of the base model.
+      model: what is simulated, without the load of its run. window: which.
+      state: at the window's start, of the base model.
       force: (steps, nv) generalized force on top, or None. late: s, by which inputs come later.
     """
 
@@ -202,6 +204,7 @@ class WindowSimulator:
 
     def _simulate(self, jobs: Sequence[Job], trace: bool) -> list[Outcome]:
         """Equal model sizes go together."""
+        jobs = self._as_in_their_runs(jobs)
         outcomes: list[Outcome | None] = [None] * len(jobs)
         models, driven = [job.model for job in jobs], [job.force is None for job in jobs]
         record = ("sensordata", *(("qpos", "qvel", "act") if trace else ()))
@@ -212,11 +215,28 @@ class WindowSimulator:
                 outcomes[i] = outcome
         return [o for o in outcomes if o is not None]
 
+    def in_run(self, model: mujoco.MjModel, run: int) -> mujoco.MjModel:
+        """The model as it was in a run: with the run's load, its drive off where nothing drove it.
+
+        Where neither is other than in the model, it is the model itself.
+        """
+        made = self.study.runs[run]
+        carries = model if made.load is None else loaded(model, made.load)
+        return _coasting(made, carries)
+
+    def _as_in_their_runs(self, jobs: Sequence[Job]) -> list[Job]:
+        known: dict[tuple[int, int], mujoco.MjModel] = {}
+        for job in jobs:
+            key = (id(job.model), job.window.run)
+            if key not in known:
+                known[key] = self.in_run(job.model, job.window.run)
+        return [replace(job, model=known[id(job.model), job.window.run]) for job in jobs]
+
     def _steps(self, model: mujoco.MjModel) -> int:
         return int(np.ceil(self.steps * self.step / model.opt.timestep)) + 1
 
     def _chunk(self, jobs: list[Job], record: Sequence[str]) -> list[Outcome]:
-        models = [_coasting(self.study.runs[j.window.run], j.model) for j in jobs]
+        models = [job.model for job in jobs]
         model = models[0]
         steps = self._steps(model)
         kept: dict[tuple[int, int, float], Array] = {}
@@ -285,8 +305,9 @@ def _lag(model: mujoco.MjModel, actuator: int) -> float:
 
 
 def _given(run: Run) -> Iterator[Part]:
-    """What of a run its simulation follows from: times, inputs, the rider's motion."""
+    """What of a run its simulation follows from: load, times, inputs, the rider's motion."""
     trial = run.trial
+    yield repr(run.load)
     yield trial.time
     if trial.inputs is not None:
         yield trial.inputs.time

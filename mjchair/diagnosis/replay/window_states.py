@@ -291,4 +291,4 @@ def _hand_over(
         return
     at = round((simulator.windows[following[0]].start - w.start) / model.opt.timestep) - 1
     at = min(max(at, 0), len(trace["qpos"]) - 1)
-    states[following[0]] = simulator.carrier.back(model, trace, at)
+    states[following[0]] = simulator.carrier.back(simulator.in_run(model, w.run), trace, at)
