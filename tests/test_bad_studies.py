@@ -175,6 +175,20 @@ CASES = {
         "initial heading is 'east'; it must be a number",
     ),
     "a number for the file": ({"columns": coast(), "file": "3"}, "file is 3; it must be text"),
+    "no file in the list": ({"columns": coast(), "file": "[]"}, "has no file; name its table"),
+    "a number in the list": ({"columns": coast(), "file": '["a.csv", 3]'}, "it must be text"),
+    "a missing table in the list": (
+        {"columns": coast(), "file": '["a.csv", "b.csv"]'},
+        "no file .*b.csv; did you mean 'a.csv'",
+    ),
+    "one table twice in the list": (
+        {"columns": coast(), "file": '["a.csv", "a.csv"]'},
+        "column 'left_wheel_speed' is in .*a.csv and in .*a.csv; leave it out of one",
+    ),
+    "a SmartWheel beside a table": (
+        {"columns": coast(), "file": '["a.csv", "a.csv"]', "trial": 'smartwheel = "left"\n'},
+        "smartwheel goes with one file",
+    ),
     "no file": ({"columns": coast(), "file": '""'}, "has no file"),
     "one [trial]": (
         {"columns": coast(), "kind": "[trial]"},

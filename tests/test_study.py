@@ -1,8 +1,11 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import mjchair
 from mjchair.diagnosis.data import first_state
+from mjchair.diagnosis.driven_run import drive_run
 from mjchair.diagnosis.replay import noise
 from mjchair.errors import MjchairError
 from mjchair.measurement import samples
@@ -94,6 +97,10 @@ def test_what_lies_outside_the_measurements_is_left_out_and_said(tmp_path):
     assert all(v.shape == trial.time.shape for v in trial.channels.values())
     assert trial.inputs.time[0] == 0.0
     assert any("nothing was measured before 0.52 s or after 2.48 s" in n for n in study.notes)
+    found = SimpleNamespace(evidence=None, effects=())
+    whole = drive_run(study, found).before  # from its first measurement on, by the same torque
+    assert whole["time"][-1] == pytest.approx(1.96)
+    np.testing.assert_allclose(whole["left_wheel"][:-1], 3.0)
 
 
 def test_one_measured_wheel_stands_for_both_and_that_is_said(tmp_path):
@@ -273,3 +280,84 @@ def test_a_measured_torque_lags_behind_no_motor(tmp_path):
     smartwheel = mjchair.read_study(samples.folder() / "smartwheel")
     assert not motors & {effect.name for effect in study_effects(smartwheel)}
     fails(write(tmp_path, wheels(), head='torque = "mesured"\n'), "did you mean 'measured'")
+
+
+KNOWN = """indoors = true
+torque = "measured"
+[material]
+force = 2.5
+[noise]
+"left_wheel_speed" = 0.02
+[noise.process]
+drive = 0.5
+[nuisance]
+"scale:left_wheel_speed" = 0.04
+"""
+
+
+def test_what_a_person_knows_reaches_the_rules_of_the_diagnosis(tmp_path):
+    from mjchair.diagnosis.diagnose import study_effects
+    from mjchair.diagnosis.fit import noise_levels
+    from mjchair.diagnosis.material import limit
+
+    plain, told = (mjchair.read_study(write(tmp_path, wheels(), head=h)) for h in ("", KNOWN))
+    assert limit(told) == 2.5 != limit(plain)
+    assert "wind" in {e.name for e in study_effects(plain)} - {e.name for e in study_effects(told)}
+    levels = noise_levels.known_parts(told)
+    assert np.hypot(*levels.values()) == pytest.approx(0.5)
+    assert not noise_levels.known_parts(plain)
+    assert noise.estimate(told)["left_wheel_speed"].source == "study.toml"
+    for bad, words in (
+        ("[noise]\nprocess = 3.0\n", "process .* is a table with drive, side or yaw"),
+        ("[noise.process]\ndrift = 1.0\n", "unknown key 'drift'"),
+        ("[material]\nforce = 0.0\n", "force is 0.0; it must be positive"),
+        ('indoors = "yes"\n', "indoors is 'yes'; it must be true or false"),
+        ("[chair]\ncambre = 0.1\n", r"\[chair\].* did you mean 'camber'"),
+        ('[nuisance]\n"scale:left_weel_speed" = 0.1\n', "did you mean 'scale:left_wheel_speed'"),
+    ):
+        fails(write(tmp_path, wheels(), head=bad), words)
+
+
+def test_a_trial_of_two_files_tells_resistance_and_the_gain_of_a_doubtful_gauge(tmp_path):
+    """Wheels at 100 Hz, of which the left gauge shows 3 % too much, and an IMU at 50 Hz."""
+    from mjchair.diagnosis.diagnose import prepare
+    from mjchair.diagnosis.fit.column_ids import RoughlyKnown
+    from mjchair.diagnosis.fit.nonlinear import refit
+    from mjchair.diagnosis.fit.variant import Term, Variant
+    from mjchair.effects.library import find
+
+    effect, rng = find("rolling_resistance"), np.random.default_rng(0)
+    spec = mjchair.load_spec()
+    effect.apply(spec, {"coefficient": 0.005})
+    run = mjchair.simulate(spec, None, 4.0, initial={"speed": 1.5}, sample_rate=100.0)
+    measured = {
+        c: gain * run[c] + size * rng.standard_normal(run.time.size)
+        for c, gain, size in (
+            ("left_wheel_speed", 1.03, 0.02),
+            ("right_wheel_speed", 1.0, 0.02),
+            ("imu_gyro.z", 1.0, 0.01),
+            ("imu_accelerometer.x", 1.0, 0.1),
+        )
+    }
+    for file, every, names in (("wheels", 1, list(measured)[:2]), ("imu", 2, list(measured)[2:])):
+        rows = np.column_stack([run.time, *(measured[n] for n in names)])[::every]
+        np.savetxt(
+            tmp_path / f"{file}.csv",
+            rows,
+            "%.9g",
+            ",",
+            header=",".join(["time", *names]),
+            comments="",
+        )
+    files = 'file = ["wheels.csv", "imu.csv"]\n'
+    (tmp_path / "study.toml").write_text(f"{KNOWN}[[trial]]\n{files}{EAST}")
+    study = mjchair.read_study(tmp_path)
+    trial = study.runs[0].trial
+    assert [round(trial.rate(c)) for c in measured] == [100, 100, 50, 50]
+    assert not study.notes
+    bench, first = prepare(study)
+    coast = Term(effect, {"coefficient": 0.0}, ("coefficient",))
+    found = refit(bench, Variant(bench.nuisances, {}, (coast,)), first)
+    assert found.variant.terms[0].values["coefficient"] == pytest.approx(0.005, rel=0.05)
+    gain = found.step[list(found.columns).index(RoughlyKnown("scale:left_wheel_speed"))]
+    assert 0.04 * gain == pytest.approx(0.03, abs=0.005)

@@ -64,3 +64,62 @@ def test_an_unknown_channel_of_a_trial_is_named(tmp_path, model):
     trial = read_trial(write(tmp_path / "a.csv", "time,left_wheel_speed\n0,1\n1,1\n"), model)
     with pytest.raises(MjchairError, match="no column 'speed'"):
         trial.samples("speed")
+
+
+def parts(folder, **texts):
+    """Tables of one trial: name -> text."""
+    return [write(folder / f"{name}.csv", text) for name, text in texts.items()]
+
+
+def test_files_of_one_trial_share_a_clock_and_keep_their_rates_and_units(tmp_path, model):
+    wheel = "".join(f"{0.01 * k!r},{57.3 * k}\n" for k in range(100))
+    gyro = "".join(f"{20 * k + 3},{k}\n" for k in range(50))  # 3 ms later, half as often
+    torque = "".join(f"{0.02 * k!r},{k}\n" for k in range(50))  # where the wheel has a sample too
+    paths = parts(
+        tmp_path,
+        wheel="time,left_wheel_speed [deg/s]\n" + wheel,
+        gyro="time [ms],imu_gyro.z\n" + gyro,
+        torque="time,left_wheel\n" + torque,
+    )
+    trial = read_trial(paths, model)
+    assert trial.name == "wheel+gyro+torque"
+    assert trial.time.size == 150  # those of the torque are there already
+    time, speed = trial.samples("left_wheel_speed")
+    assert (time == 0.01 * np.arange(100)).all()
+    np.testing.assert_allclose(speed, np.arange(100), rtol=1e-4)
+    time, turn = trial.samples("imu_gyro.z")
+    np.testing.assert_allclose(time, 0.02 * np.arange(50) + 0.003)
+    assert (turn == np.arange(50)).all()
+    assert (trial.inputs.time == 0.02 * np.arange(50)).all()  # its own: no sample is missing
+    assert (trial.inputs.controls["left_wheel"] == np.arange(50)).all()
+    assert trial.inputs.at("left_wheel", 0.03) == pytest.approx(1.5)
+
+
+def test_inputs_of_two_files_are_each_straight_between_their_own_samples(tmp_path, model):
+    both = XML.replace("</actuator>", '<motor name="right_wheel" joint="left_wheel"/></actuator>')
+    model = mujoco.MjModel.from_xml_string(both)
+    paths = parts(
+        tmp_path,
+        left="time,left_wheel,left_wheel_speed\n0,0,1\n1,10,1\n2,0,1\n",
+        right="time,right_wheel\n0.5,5\n1.5,0\n2.5,5\n",
+    )
+    inputs = read_trial(paths, model).inputs
+    assert inputs.at("left_wheel", [0.5, 1.5]) == pytest.approx([5.0, 5.0])
+    assert inputs.at("right_wheel", [1.0, 2.0]) == pytest.approx([2.5, 2.5])
+    assert list(inputs.samples("right_wheel")[0]) == [0.5, 1.5, 2.5]
+
+
+@pytest.mark.parametrize(
+    ("second", "line"),
+    [
+        ("time,left_wheel_speed\n0,1\n1,1\n", "'left_wheel_speed' is in .*a.csv and in .*b.csv"),
+        ("time,imu_gyro.z\n10,1\n11,1\n", "a.csv lasts from 0 to 1 s and .*b.csv .* 10 to 11 s"),
+        ("time,imu_gyro.z\n-1,1\n0,1\n", "b.csv lasts from -1 to 0 s and .*a.csv .* 0 to 1 s"),
+        ("time,imu_gyro.z\n0,1\n1e-6,1\n1,1\n", "b.csv: two samples are less than 1e-05 s apart"),
+    ],
+)
+def test_files_that_are_not_of_one_trial_get_one_line(tmp_path, model, second, line):
+    paths = parts(tmp_path, a="time,left_wheel_speed\n0,1\n1,0.9\n", b=second)
+    with pytest.raises(MjchairError, match=line) as error:
+        read_trial(paths, model)
+    assert "\n" not in str(error.value)

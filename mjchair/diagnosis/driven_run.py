@@ -19,6 +19,7 @@ from mjchair.model.rolling import rear_axle
 from mjchair.simulation.inputs import Inputs, drivable
 from mjchair.simulation.recording import Recording
 from mjchair.simulation.simulate import simulate
+from mjchair.simulation.table import Table, merged
 
 LONGEST = 30.0  # s, of the run that is simulated; of a longer one the beginning
 
@@ -71,10 +72,11 @@ def _driven(spec: mujoco.MjSpec, run: Run) -> Recording:
 def _inputs(run: Run, model: mujoco.MjModel, begin: float) -> Inputs | None:
     """What drove the run, from 0 s, and its motions that an actuator of the chair follows."""
     given = run.trial.inputs
-    controls = {} if given is None else dict(given.controls)
-    controls |= {name: v for name, v in run.trial.other.items() if name in drivable(model)}
-    if not controls:
+    followed = {name: v for name, v in run.trial.other.items() if name in drivable(model)}
+    tables = [] if given is None else [Table(given.time, given.controls, run.trial.name)]
+    tables += [Table(run.trial.time, followed, run.trial.name)] if followed else []
+    if not tables:
         return None
-    return Inputs(
-        run.trial.time - begin, controls, run.trial.name, given is not None and given.hold
-    )
+    table = merged(tables)
+    hold = given is not None and given.hold
+    return Inputs(table.time - begin, table.columns, run.trial.name, hold)

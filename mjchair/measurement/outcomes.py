@@ -259,8 +259,7 @@ def of_trial(trial: Trial, wheel: str = "left_wheel") -> Rim:
     if trial.inputs is None or wheel not in trial.inputs.controls:
         known = trial.inputs.controls if trial.inputs is not None else ()
         raise MjchairError(f"{trial.name}: no torque of {wheel}" + nearest(wheel, known))
-    time = trial.time[np.isfinite(trial.inputs.controls[wheel])]
-    moment = trial.inputs.at(wheel, time)
+    time, moment = trial.inputs.samples(wheel)
     if f"{wheel}_angle" in trial.channels:
         angle = np.interp(time, *trial.samples(f"{wheel}_angle"))
         return Rim(time, angle, _speed(time, angle), moment, None, wheel)

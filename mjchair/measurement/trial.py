@@ -6,7 +6,7 @@ In: a table, or arrays. Out: a `Trial` in SI units.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -21,7 +21,7 @@ from mjchair.rider.anatomy import JOINT_NAMES
 from mjchair.simulation.channels import channels
 from mjchair.simulation.frozen import FrozenRecord
 from mjchair.simulation.inputs import OTHER_COLUMNS, Inputs, drivable
-from mjchair.simulation.table import Array, Table, leave_out, read_table
+from mjchair.simulation.table import Array, Table, leave_out, merged, read_table
 
 MOTION = "rider_motion"
 
@@ -59,19 +59,26 @@ class Trial(FrozenRecord):
         return float(1.0 / np.median(np.diff(time))) if time.size > 1 else 0.0
 
 
-def read_trial(path: str | os.PathLike[str], model: mujoco.MjModel, hold: bool = False) -> Trial:
+def read_trial(
+    path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
+    model: mujoco.MjModel,
+    hold: bool = False,
+) -> Trial:
     """Read a measured run and check its columns against the model that is to explain it.
 
     Args:
-      path: a table, see mjchair.simulation.table.
+      path: a table, see mjchair.simulation.table; or several that share one clock, which may have
+        different rates.
       model: whose sensors and actuators the columns are named after.
       hold: inputs keep their value until the next sample, see Inputs.
 
     Raises:
       MjchairError: a column that is nearly a sensor's or an actuator's (others are left out, with
-        a note), a run without measurements, or as read_table does.
+        a note), a run without measurements, or as read_table and merged do.
     """
-    return trial_from_table(read_table(path), model, Path(path).stem, hold)
+    paths = [Path(path)] if isinstance(path, str | os.PathLike) else [Path(p) for p in path]
+    table = merged([read_table(p) for p in paths])
+    return trial_from_table(table, model, "+".join(p.stem for p in paths), hold)
 
 
 def trial_from_table(table: Table, model: mujoco.MjModel, name: str, hold: bool = False) -> Trial:
@@ -101,9 +108,16 @@ def trial_from_table(table: Table, model: mujoco.MjModel, name: str, hold: bool 
         name=name,
         time=table.time,
         channels=MappingProxyType(measured),
-        inputs=Inputs(table.time, controls, table.source, hold) if controls else None,
+        inputs=_inputs(table, controls, hold) if controls else None,
         other=MappingProxyType(other),
     )
+
+
+def _inputs(table: Table, controls: dict[str, Array], hold: bool) -> Inputs:
+    """The inputs, at the times of their own samples: other columns may have other rates."""
+    there = ~np.all([np.isnan(values) for values in controls.values()], axis=0)
+    kept = {name: values[there] for name, values in controls.items()}
+    return Inputs(table.time[there], kept, table.source, hold)
 
 
 def check_columns(trial: Trial, model: mujoco.MjModel) -> None:

@@ -90,10 +90,14 @@ class Inputs(FrozenRecord):
         """Time of the last sample, s."""
         return float(self.time[-1])
 
+    def samples(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Times (s) and values of the samples of a control that are there."""
+        there = ~np.isnan(self.controls[name])
+        return self.time[there], self.controls[name][there]
+
     def at(self, name: str, time: ArrayLike) -> NDArray[np.float64]:
         """The control `name` at the times given (s), of their shape."""
-        there = ~np.isnan(self.controls[name])
-        times, values = self.time[there], self.controls[name][there]
+        times, values = self.samples(name)
         wanted = np.asarray(time, float)
         if not self.hold:
             return np.asarray(np.interp(wanted, times, values, left=0.0, right=0.0))
@@ -130,8 +134,7 @@ class Inputs(FrozenRecord):
 
     def position(self, name: str, time: ArrayLike) -> NDArray[np.float64]:
         """The control `name` at the times given (s), of their shape, taken as a position."""
-        there = ~np.isnan(self.controls[name])
-        known, values = self.time[there], self.controls[name][there]
+        known, values = self.samples(name)
         inside = np.clip(np.asarray(time, float), known[0], known[-1])
         if known.size == 1:
             return np.full(inside.shape, values[0])

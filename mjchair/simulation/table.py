@@ -6,8 +6,9 @@ In: a file. Out: a `Table` of named columns in SI on one clock, with every sampl
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from types import MappingProxyType
 
@@ -23,6 +24,7 @@ Array = NDArray[np.float64]
 
 # a time column without a unit that has more samples and longer steps seems to be in milliseconds
 MANY, LONG_STEP = 20, 1.0  # samples, s
+SAME = 1e-5  # s, within which samples of two tables are of one time
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -125,6 +127,50 @@ def read_table(path: str | os.PathLike[str]) -> Table:
     else:
         raise MjchairError(f"{path}: a table ends in .csv or .parquet, not {path.suffix!r}")
     return _table(header, data, str(path))
+
+
+def merged(tables: Sequence[Table]) -> Table:
+    """One table of several that share one clock: every sample at its own time, NaN elsewhere.
+
+    Raises:
+      MjchairError: no time that two of them share, a column that is in two, two samples of a table
+        within SAME.
+    """
+    if len(tables) == 1:
+        return tables[0]
+    for earlier, later in combinations(sorted(tables, key=lambda table: table.time[0]), 2):
+        _check_together(earlier, later)
+    ticks = [np.round(table.time / SAME).astype(np.int64) for table in tables]
+    every, first = np.unique(np.concatenate(ticks), return_index=True)
+    columns: dict[str, Array] = {}
+    for table, mine in zip(tables, ticks, strict=True):
+        rows = np.searchsorted(every, mine)
+        if np.unique(rows).size < rows.size:
+            raise MjchairError(
+                f"{table.source}: two samples are less than {SAME:g} s apart; take one of them out"
+            )
+        for name, values in table.columns.items():
+            columns[name] = np.full(every.size, np.nan)
+            columns[name][rows] = values
+    time = np.concatenate([table.time for table in tables])[first]
+    return Table(time, columns, ", ".join(table.source for table in tables))
+
+
+def _check_together(earlier: Table, later: Table) -> None:
+    """Raise MjchairError unless two tables overlap in time and no column is in both."""
+    if later.time[0] >= earlier.time[-1]:
+        spans = " and ".join(
+            f"{t.source} lasts from {t.time[0]:g} to {t.time[-1]:g} s" for t in (earlier, later)
+        )
+        raise MjchairError(
+            f"{spans}; tables of one trial share one clock (`mjchair gather` aligns them)"
+        )
+    for name in later.columns:
+        if name in earlier.columns:
+            raise MjchairError(
+                f"column {name!r} is in {earlier.source} and in {later.source}; "
+                "leave it out of one of them"
+            )
 
 
 def _check_seconds(time: Array, source: str) -> None:

@@ -15,7 +15,8 @@ import numpy as np
 from msgspec import Meta, Struct, structs
 
 from mjchair.diagnosis.data import unit_checks
-from mjchair.diagnosis.data.study import Run, Study, make_study
+from mjchair.diagnosis.data.roughly_known import nuisances
+from mjchair.diagnosis.data.study import Run, Study, make_study, with_copied_wheels
 from mjchair.errors import MjchairError, nearest
 from mjchair.measurement import baseline as baselines
 from mjchair.measurement import smartwheel
@@ -56,9 +57,9 @@ class LoadEntry(Struct, forbid_unknown_fields=True):
 
 
 class TrialEntry(Struct, forbid_unknown_fields=True):
-    """One [[trial]]: its table, its manoeuvre, and what is known of its start."""
+    """One [[trial]]: its table or tables, its manoeuvre, and what is known of its start."""
 
-    file: str = ""
+    file: str | list[str] = ""
     manoeuvre: str = "run"
     hold_out: bool = False
     initial: InitialEntry | None = None
@@ -112,8 +113,8 @@ def read_study(folder: str | os.PathLike[str]) -> Study:
     """Read a study folder.
 
     Raises:
-      MjchairError: no study.toml, a key or table that is not known or not there, no trial, a trial
-        too short, every trial held out, or as the readers of models and tables do.
+      MjchairError: no study.toml, a key, nuisance or table that is not known or not there, no
+        trial, a trial too short, every trial held out, or as the readers of models and tables do.
     """
     path = Path(folder)
     path = path / FILE if path.is_dir() else path
@@ -136,6 +137,7 @@ def read_study(folder: str | os.PathLike[str]) -> Study:
         if channel not in measured
     ]
     study = make_study(spec, runs, noise, entry.nuisance, notes, str(path.parent))
+    nuisances(with_copied_wheels(study).channels, study.nuisance)  # an unknown one is refused
     return replace(
         study,
         process=process,
@@ -223,21 +225,27 @@ def _runs(entry: StudyEntry, path: Path, model: mujoco.MjModel) -> list[Run]:
 
 
 def _trial(told: TrialEntry, entry: StudyEntry, path: Path, model: mujoco.MjModel) -> Trial:
-    """The table of one [[trial]], or the recording of an instrumented wheel."""
+    """The table or tables of one [[trial]], or the recording of an instrumented wheel."""
     if not told.file:
         raise MjchairError(f"{path}: a [[trial]] has no file; name its table")
-    file = path.parent / told.file
+    names = [told.file] if isinstance(told.file, str) else told.file
+    files = [path.parent / name for name in names]
     if told.smartwheel is None:
         if told.baseline is not None:
             raise MjchairError(f'{path}: baseline goes with smartwheel = "left" or "right"')
         between = entry.inputs if told.inputs is None else told.inputs
         _check_choice("inputs is", between, BETWEEN, path)
-        return read_trial(file, model, between == BETWEEN[1])
+        return read_trial(files, model, between == BETWEEN[1])
     _check_choice("smartwheel", told.smartwheel, SIDES, path)
-    run = smartwheel.read_smartwheel(file)
+    if len(files) > 1:
+        raise MjchairError(
+            f"{path}: smartwheel goes with one file, and {names[0]} is not alone; "
+            "`mjchair gather` puts a SmartWheel and other instruments on one clock"
+        )
+    run = smartwheel.read_smartwheel(files[0])
     still = smartwheel.read_smartwheel(path.parent / told.baseline) if told.baseline else None
     clean = smartwheel.oriented(baselines.without_baseline(run, still))
-    return smartwheel.as_trial(clean, told.smartwheel, file.stem)
+    return smartwheel.as_trial(clean, told.smartwheel, files[0].stem)
 
 
 def _check_choice(what: str, value: str, known: tuple[str, ...], path: Path) -> None:

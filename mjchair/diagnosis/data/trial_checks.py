@@ -100,10 +100,10 @@ def _check_clock(trial: Trial) -> None:
 
 def _check_inputs(trial: Trial, inputs: Inputs) -> None:
     first, last = float(trial.time[0]), float(trial.time[-1])
-    for name, values in inputs.controls.items():
+    for name in inputs.controls:
         if base_name(name) in JOINT_NAMES:  # held before and after, and interpolated between
             continue
-        time = inputs.time[~np.isnan(values)]
+        time, _ = inputs.samples(name)
         if time[0] > first + COVERS or time[-1] < last - COVERS:
             raise MjchairError(
                 f"{trial.name}: {name} is there from {time[0]:g} to {time[-1]:g} s, and the run "

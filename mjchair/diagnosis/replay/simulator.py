@@ -129,12 +129,9 @@ class WindowSimulator:
 
     def input_step(self) -> float:
         """Median time between samples of the inputs, s; 0 where nothing is driven."""
-        steps = [
-            float(np.median(np.diff(r.trial.inputs.time)))
-            for r in self.study.runs
-            if r.trial.inputs is not None and r.trial.inputs.time.size > 1
-        ]
-        return max(steps, default=0.0)
+        driven = [r.trial.inputs for r in self.study.runs if r.trial.inputs is not None]
+        times = [inputs.samples(name)[0] for inputs in driven for name in inputs.controls]
+        return max((float(np.median(np.diff(t))) for t in times if t.size > 1), default=0.0)
 
     def measured(self, window: Window) -> Array:
         """Samples (rows, channels) of a window, NaN where missing."""

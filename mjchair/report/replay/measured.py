@@ -71,8 +71,8 @@ def measured_track(recording: Recording, trial: Trial, label: str, status: str =
     kept = evenly(time, min(MOST, time.size))
     signals = {name: _filled(trial, name, motion.time) for name in trial.channels}
     if trial.inputs is not None:
-        for name, values in trial.inputs.controls.items():
-            signals[name] = np.interp(motion.time, trial.inputs.time, values)
+        for name in trial.inputs.controls:
+            signals[name] = np.interp(motion.time, *trial.inputs.samples(name))
     span = float(np.ptp(time))
     return Track(
         label=label,
