@@ -106,7 +106,7 @@ class StudyEntry(Struct, forbid_unknown_fields=True):
     material: MaterialEntry | None = None
     nuisance: dict[str, Positive] = {}
     trial: list[TrialEntry] = []
-    kind: str = "runs"
+    kind: Literal["runs", "rig"] = "runs"
 
 
 def read_study(folder: str | os.PathLike[str]) -> Study:
