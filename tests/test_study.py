@@ -91,7 +91,8 @@ def test_what_lies_outside_the_measurements_is_left_out_and_said(tmp_path):
     torque = np.full(TIME.size, 3.0)
     seen = {n: np.where((TIME > 0.5) & (TIME < 2.5), v, np.nan) for n, v in wheels().items()}
     columns = {n: ["" if np.isnan(x) else x for x in v] for n, v in seen.items()}
-    study = mjchair.read_study(write(tmp_path, columns | {"left_wheel": torque}))
+    load = "[trial.load]\nmass = 20.0\nheight = 0.6\n"
+    study = mjchair.read_study(write(tmp_path, columns | {"left_wheel": torque}, load))
     trial = study.runs[0].trial
     assert (trial.time[0], trial.time[-1]) == (0.52, 2.48)
     assert all(v.shape == trial.time.shape for v in trial.channels.values())
@@ -101,6 +102,8 @@ def test_what_lies_outside_the_measurements_is_left_out_and_said(tmp_path):
     whole = drive_run(study, found).before  # from its first measurement on, by the same torque
     assert whole["time"][-1] == pytest.approx(1.96)
     np.testing.assert_allclose(whole["left_wheel"][:-1], 3.0)
+    masses = [m.body_mass.sum() for m in (whole.model.load(), study.spec.compile())]
+    assert masses[0] - masses[1] == pytest.approx(20.0)  # the load of the run
 
 
 def test_one_measured_wheel_stands_for_both_and_that_is_said(tmp_path):

@@ -1,8 +1,9 @@
 """One run of a diagnosed study, simulated with the chair before and after its correction.
 
 In: a study and its diagnosis. Out: `DrivenRun`, the measured run and the recordings of both chairs,
-which a report draws. The chairs are driven by the measured inputs, from the run's first place,
-heading and speed, with everything that is only roughly known as the study has it.
+which a report draws. The chairs carry the load of the run and are driven by the measured inputs,
+from its first place, heading and speed, with everything that is only roughly known as the study has
+it.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from mjchair.diagnosis.data.first_state import initial
 from mjchair.diagnosis.data.study import Run, Study
 from mjchair.diagnosis.diagnose import corrected
 from mjchair.diagnosis.result import Diagnosis
+from mjchair.model.load import strap
 from mjchair.model.rolling import rear_axle
 from mjchair.simulation.inputs import Inputs, drivable
 from mjchair.simulation.recording import Recording
@@ -61,6 +63,8 @@ def representative_run(study: Study, diagnosis: Diagnosis) -> Run:
 
 def _driven(spec: mujoco.MjSpec, run: Run) -> Recording:
     spec = spec.copy()
+    if run.load is not None:
+        strap(spec, run.load)
     model = spec.compile()
     begin = float(run.trial.time[0])
     duration = min(run.duration, LONGEST)
