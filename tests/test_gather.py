@@ -12,8 +12,10 @@ from mjchair.measurement.clocks import Signal, align, best_alignment
 from mjchair.measurement.delimited import read_delimited
 from mjchair.measurement.exports import matching, read_export, read_formats
 from mjchair.measurement.gather.coasts import coasts
-from mjchair.measurement.gather.gather import gather
+from mjchair.measurement.gather.gather import gather, table_text
+from mjchair.measurement.gather.join import GatheredTrial
 from mjchair.measurement.gather.known import Known
+from mjchair.simulation.table import read_table
 
 # the chair's axes in a sensor's: x, y, z as rows; it lies on its side and looks backwards
 TILTED = np.array([[-0.5, 0.866, 0.0], [0.0, 0.0, -1.0], [-0.866, -0.5, 0.0]])
@@ -128,6 +130,16 @@ def test_files_of_two_motions_are_not_put_together(tmp_path, run):
         gather(tmp_path)
     told = gather(tmp_path, offsets={"sensors.csv": 0.4}).trials[0]
     assert told.alignments["a_imu/sensors.csv"].how == "given"
+
+
+def test_samples_of_two_clocks_stay_apart_in_the_table_of_a_long_trial(tmp_path):
+    """20 minutes in, two instruments have samples 12 microseconds apart."""
+    time = np.array([0.0, 1200.0, 1200.000012])
+    speeds = {"left_wheel_speed": np.array([1.0, 0.1, np.nan]), "imu_gyro.z": np.array([0, 0, 1.0])}
+    (tmp_path / "a.csv").write_text(table_text(GatheredTrial("a", time, speeds, "coast")))
+    table = read_table(tmp_path / "a.csv")
+    np.testing.assert_allclose(table.time, time, rtol=0.0, atol=1e-9)
+    np.testing.assert_array_equal(table.columns["left_wheel_speed"], speeds["left_wheel_speed"])
 
 
 def test_even_strokes_leave_the_lag_open():

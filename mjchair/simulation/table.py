@@ -140,19 +140,18 @@ def merged(tables: Sequence[Table]) -> Table:
         return tables[0]
     for earlier, later in combinations(sorted(tables, key=lambda table: table.time[0]), 2):
         _check_together(earlier, later)
-    ticks = [np.round(table.time / SAME).astype(np.int64) for table in tables]
-    every, first = np.unique(np.concatenate(ticks), return_index=True)
+    stacked = np.sort(np.concatenate([table.time for table in tables]))
+    time = stacked[np.r_[True, np.diff(stacked) > SAME]]
     columns: dict[str, Array] = {}
-    for table, mine in zip(tables, ticks, strict=True):
-        rows = np.searchsorted(every, mine)
+    for table in tables:
+        rows = np.searchsorted(time, table.time, side="right") - 1
         if np.unique(rows).size < rows.size:
             raise MjchairError(
                 f"{table.source}: two samples are less than {SAME:g} s apart; take one of them out"
             )
         for name, values in table.columns.items():
-            columns[name] = np.full(every.size, np.nan)
+            columns[name] = np.full(time.size, np.nan)
             columns[name][rows] = values
-    time = np.concatenate([table.time for table in tables])[first]
     return Table(time, columns, ", ".join(table.source for table in tables))
 
 

@@ -204,7 +204,9 @@ def _rests(trial: GatheredTrial) -> list[tuple[float, float]]:
 
 def table_text(trial: GatheredTrial) -> str:
     """A trial's table as CSV, SI, an empty cell where a sample is missing."""
-    header = ",".join(["time", *trial.columns])
-    rows = np.column_stack([trial.time, *trial.columns.values()]).tolist()
-    lines = [",".join("" if x != x else f"{x:.7g}" for x in row) for row in rows]
-    return "\n".join([header, *lines]) + "\n"
+    lines = [",".join(["time", *trial.columns])]
+    rows = np.column_stack(list(trial.columns.values())).tolist()
+    for time, row in zip(trial.time.tolist(), rows, strict=True):  # times may be 1e-5 s apart
+        cells = ("" if x != x else f"{x:.7g}" for x in row)
+        lines.append(",".join([f"{round(time, 6):.12g}", *cells]))
+    return "\n".join(lines) + "\n"

@@ -16,10 +16,10 @@ from mjchair.errors import MjchairError
 from mjchair.measurement import clocks, imu
 from mjchair.measurement.clocks import Alignment, Signal
 from mjchair.measurement.gather.instruments import Instrument, shifted
+from mjchair.simulation.table import SAME, Table, merged
 
 Array = NDArray[np.float64]
 
-SAME = 1e-5  # s, within which two samples are of one time
 LEAST = 1.0  # s, of a trial
 RESTS = 0.05  # rad/s of a wheel, below which the chair stands
 TURNS = 0.03  # rad/s rms, of a turning by which sides are checked
@@ -226,21 +226,18 @@ def _span(ours: Sequence[Instrument]) -> tuple[float, float]:
 
 def _table(ours: Sequence[Instrument], begin: float, end: float) -> tuple[Array, dict[str, Array]]:
     """All samples within a span of the reference's clock, each in the row of its own time."""
-    kept = [(one, (one.time >= begin - SAME) & (one.time <= end + SAME)) for one in ours]
-    ticks = [np.round(one.time[inside] / SAME).astype(np.int64) for one, inside in kept]
-    rows, places = np.unique(np.concatenate(ticks), return_inverse=True)
-    if rows.size < 2:
+    tables: list[Table] = []
+    for one in ours:
+        inside = (one.time >= begin - SAME) & (one.time <= end + SAME)
+        columns = {
+            name: values[inside]
+            for name, values in {**one.torque, **one.channels}.items()
+            if np.isfinite(values[inside]).any() and not any(name in t.columns for t in tables)
+        }
+        if columns:
+            tables.append(Table(one.time[inside] - begin, columns, one.name))
+    if not tables:
         return np.zeros(1), {}
-    columns: dict[str, Array] = {}
-    first = 0
-    for (one, inside), mine in zip(kept, ticks, strict=True):
-        place = places[first : first + mine.size]
-        first += mine.size
-        for name, values in {**one.torque, **one.channels}.items():
-            if name in columns:
-                continue
-            columns[name] = np.full(rows.size, np.nan)
-            columns[name][place] = values[inside]
-    order = sorted(columns, key=lambda n: (n not in ("left_wheel", "right_wheel"), n))
-    there = [n for n in order if np.isfinite(columns[n]).any()]
-    return np.asarray(rows * SAME - begin, np.float64), {n: columns[n] for n in there}
+    table = merged(tables)
+    order = sorted(table.columns, key=lambda n: (n not in ("left_wheel", "right_wheel"), n))
+    return table.time, {name: table.columns[name] for name in order}
