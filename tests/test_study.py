@@ -315,6 +315,7 @@ def test_what_a_person_knows_reaches_the_rules_of_the_diagnosis(tmp_path):
         ("[noise.process]\ndrift = 1.0\n", "unknown key 'drift'"),
         ("[material]\nforce = 0.0\n", "force is 0.0; it must be positive"),
         ('indoors = "yes"\n', "indoors is 'yes'; it must be true or false"),
+        ('kind = "rgi"\n', "kind is 'rgi'; did you mean 'rig'"),
         ("[chair]\ncambre = 0.1\n", r"\[chair\].* did you mean 'camber'"),
         ('[nuisance]\n"scale:left_weel_speed" = 0.1\n', "did you mean 'scale:left_wheel_speed'"),
     ):
