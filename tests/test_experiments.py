@@ -174,21 +174,44 @@ def test_a_lab_without_torque_gets_none():
     assert len({m.name for m in LIBRARY}) == len(LIBRARY)
 
 
+@pytest.mark.parametrize("manoeuvre", LIBRARY, ids=lambda m: m.name)
+def test_the_words_of_a_manoeuvre_hold_its_numbers(manoeuvre):
+    words = manoeuvre.words
+    assert not manoeuvre.speed or f"{abs(manoeuvre.speed):g} m/s" in words
+    assert ("backwards" in words) == (manoeuvre.speed < 0.0)
+    if manoeuvre.yaw_rate:
+        assert f"{abs(manoeuvre.yaw_rate):g} rad/s" in words
+        assert "to the left" in words if manoeuvre.yaw_rate > 0.0 else "to the right" in words
+    if manoeuvre.turned:
+        assert f"{math.degrees(manoeuvre.turned):.0f} degrees" in words
+    assert all(f"{m:g} m " in f"{words} " for m in manoeuvre.shift if m)
+    if manoeuvre.load is not None:
+        assert f"{manoeuvre.load.mass:g} kg" in words and f"{manoeuvre.load.height:g} m" in words
+
+
 def plan_of(*least):
     ordered = tuple(Experiment(m, (t,)) for m, t in zip(LIBRARY, least, strict=False))
     evidence = Evidence("left_wheel_speed", 5.7, 3.0, 2.8, 9.0)
-    return Plan(("rolling_resistance",), ("sensor_bias:imu_gyro.z",), ordered, (evidence,))
+    names = ("rolling_resistance",), ("sensor_bias:imu_gyro.z",)
+    return Plan(*names, ordered, (evidence,), run="coast_1")
 
 
 def test_the_words_say_what_to_do_and_what_to_see(one_way):
     simulator = one_way[2].simulator
     said = wording.deciding(plan_of(25.0, 1.0), simulator)
     assert LIBRARY[0].words in said and "about 5 sigmas" in said
+    assert "Start where coast_1 starts, with its heading." in said and "torque" not in said
     assert "0.2 rad/s lower if it is sensor bias of imu_gyro.z" in said
     assert " Or " not in said and "repeat" not in said
     assert " Or " in wording.deciding(plan_of(25.0, 24.0), simulator)
     assert "repeat it 3 times" in wording.deciding(plan_of(3.5), simulator)
     assert "No manoeuvre of the library decides" in wording.deciding(plan_of(0.0), simulator)
+    few = (BY_NAME["loaded slalom"], BY_NAME["coast reversed"])
+    loaded, aside = (replace(plan_of(25.0), experiments=(Experiment(m, (25.0,)),)) for m in few)
+    said = wording.deciding(replace(loaded, torque=9.0), simulator)
+    assert "with up to 9 N m a wheel; record 6 s and the torque of each" in said
+    assert "[trial.load] with mass = 15 and height = 0.55" in said
+    assert "but for what is said here" in wording.deciding(aside, simulator)
 
 
 @pytest.mark.parametrize(

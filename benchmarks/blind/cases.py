@@ -79,9 +79,19 @@ def case(number: int, seed: int) -> Case:
     ones = [k for k in range(20) if k not in (0, 3, 6, 10, 13, 16, 5, 15, 4, 11, 18)]
     nth = turn * len(ones) + ones.index(place)
     name = EFFECTS[order[nth % len(EFFECTS)]]
-    sigma = (50.0, 15.0, 5.0)[(nth // len(EFFECTS)) % 3]
+    return _single(name, (50.0, 15.0, 5.0)[(nth // len(EFFECTS)) % 3], rng)
+
+
+def _single(name: str, sigma: float, rng: np.random.Generator) -> Case:
     channel = str(rng.choice(SENSOR_CHANNELS)) if name.startswith("sensor") else ""
     return Case("one", {name: parameters(name, rng)}, sigma, channel)
+
+
+def single_case(number: int, seed: int) -> Case:
+    """Case `number` of those that hide one effect each, at 40 to 50 sigma; 25 hold every effect."""
+    rng = np.random.default_rng([seed, number, 9])
+    order = np.random.default_rng([seed, 13]).permutation(len(EFFECTS))
+    return _single(EFFECTS[order[number % len(EFFECTS)]], float(rng.uniform(40.0, 50.0)), rng)
 
 
 def planar_case(number: int, seed: int) -> Case:
@@ -102,6 +112,4 @@ def planar_case(number: int, seed: int) -> Case:
     nth = turn * len(ones) + ones.index(place)
     order = np.random.default_rng([seed, 12]).permutation(len(planar.EFFECTS))
     name = planar.EFFECTS[order[nth % len(planar.EFFECTS)]]
-    sigma = (40.0, 15.0)[(nth // len(planar.EFFECTS)) % 2]
-    channel = str(rng.choice(SENSOR_CHANNELS)) if name.startswith("sensor") else ""
-    return Case("one", {name: parameters(name, rng)}, sigma, channel)
+    return _single(name, (40.0, 15.0)[(nth // len(planar.EFFECTS)) % 2], rng)

@@ -144,6 +144,11 @@ class World:
         for w in wheels:
             self.m.geom_user[self.tire[w], COEFFICIENTS + 3] *= factor  # a3 of PAC89
 
+    def load(self, mass: float, height: float) -> None:
+        """Strap a mass (kg) to the chair, above its rear axle, at a height (m)."""
+        self._add_mass(mass, np.array([0.0, 0.0, height]))
+        mujoco.mj_setConst(self.m, mujoco.MjData(self.m))
+
     def change(self, name: str, by: float) -> None:
         """Change one of the ROUGHLY known numbers."""
         m, c = self.m, self.chair
@@ -183,12 +188,15 @@ class World:
         self.m.body_ipos[self.chair, :2] += x, y
 
     def _edit_payload(self, mass: float, height: float) -> None:
+        ahead, left = self.m.body_ipos[self.chair, :2]
+        self._add_mass(mass, np.array([ahead, left, height]))
+
+    def _add_mass(self, mass: float, at: np.ndarray) -> None:
         m, c = self.m, self.chair
         rotation = np.zeros(9)
         mujoco.mju_quat2Mat(rotation, m.body_iquat[c])
         r = rotation.reshape(3, 3)
         old = r @ np.diag(m.body_inertia[c]) @ r.T
-        at = np.array([m.body_ipos[c, 0], m.body_ipos[c, 1], height])
         apart = at - m.body_ipos[c]
         shared = m.body_mass[c] * mass / (m.body_mass[c] + mass)
         new = old + shared * (apart @ apart * np.eye(3) - np.outer(apart, apart))
@@ -246,8 +254,21 @@ class World:
         d.xfrc_applied[c] = total
 
     def _force_rolling_resistance(self, d, p, r, v, speed, yaw, driven, total):
+        # on every wheel by itself, so that a chair that turns on the spot feels it too
         weight = 9.81 * float(self.m.body_subtreemass[self.chair])
-        total[:3] -= p["coefficient"] * weight * np.tanh(speed / 0.01) * r[:, 0]
+        centre = d.subtree_com[self.chair]
+        hubs = [d.xpos[self.m.body(w).id] - centre for w in WHEELS]
+        ahead = [float(r[:, 0] @ (hubs[k] + hubs[k + 1])) / 2.0 for k in (0, 2)]
+        casters = ahead[0] / (ahead[0] - ahead[1])  # share of the load, as of a chair that rests
+        shares = (1.0 - casters, 1.0 - casters, casters, casters)
+        for w, hub, share in zip(WHEELS, hubs, shares, strict=True):
+            rolls = np.cross(d.geom_xmat[self.tire[w]].reshape(3, 3)[:, 2], (0.0, 0.0, 1.0))
+            rolls /= np.linalg.norm(rolls)
+            velocity = v + np.cross((0.0, 0.0, yaw), hub + centre - d.xpos[self.chair])
+            load = 0.5 * share * weight
+            force = -p["coefficient"] * load * np.tanh(float(velocity @ rolls) / 0.01) * rolls
+            total[:3] += force
+            total[5] += hub[0] * force[1] - hub[1] * force[0]
 
     def _force_bearing_friction(self, d, p, r, v, speed, yaw, driven, total):
         for w in WHEELS[:2]:
@@ -381,20 +402,58 @@ def make(
     rng = np.random.default_rng([seed, 1])
     world = World(np.random.default_rng([seed, 2]), case.hidden)
     lines = ['model = "manual"', 'scene = "flat"', "", "[noise]"]
-    kept = [n for n in NOISE if channels is None or n in channels]
+    kept = tuple(n for n in NOISE if channels is None or n in channels)
     lines += [f'"{n}" = {NOISE[n][0]}' for n in kept]
     for k, man in enumerate(chosen):
-        exact, told = run(world, man, seconds)
-        table = sense(rng, case, exact, told)
-        table = {n: v for n, v in table.items() if n == "time" or n in kept}
-        if man.torque:
-            table["left_wheel"], table["right_wheel"] = told[:, 1], told[:, 2]
         file = f"{man.name}_{k}.csv"
-        _write(folder / file, table)
+        _write(folder / file, _table(world, man, seconds, rng, case, kept))
         lines += ["", "[[trial]]", f'file = "{file}"', f'manoeuvre = "{man.name}"']
         lines += ["hold_out = true"] if k == held else []
     (folder / "study.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
     seal(folder / SEAL, case)
+
+
+def add_trial(
+    folder: Path,
+    case: Case,
+    seed: int,
+    man: Manoeuvre,
+    seconds: float,
+    nth: int,
+    load: tuple[float, float] | None = None,
+) -> None:
+    """Make one run more with the chair of a study from `make`, and write it into the study.
+
+    Args:
+      case, seed: as in `make`, which has sized the case. nth: further run of the study, from 1.
+      load: mass (kg) and height (m) of what is strapped down above the rear axle.
+    """
+    world = World(np.random.default_rng([seed, 2]), case.hidden)
+    lines = ["", "[[trial]]", f'file = "further_{nth}.csv"', f'manoeuvre = "{man.name}"']
+    if load is not None:
+        world.load(*load)
+        lines += ["", "[trial.load]", f"mass = {load[0]}", f"height = {load[1]}"]
+    rng = np.random.default_rng([seed, 3, nth])
+    _write(folder / f"further_{nth}.csv", _table(world, man, seconds, rng, case, tuple(NOISE)))
+    with (folder / "study.toml").open("a", encoding="utf-8") as file:
+        file.write("\n".join(lines) + "\n")
+
+
+def _table(
+    world: World,
+    man: Manoeuvre,
+    seconds: float,
+    rng: np.random.Generator,
+    case: Case,
+    kept: tuple[str, ...],
+) -> dict[str, np.ndarray]:
+    """What the sensors in `kept` record of one run, with the torques that were asked for."""
+    exact, told = run(world, man, seconds)
+    table = sense(rng, case, exact, told)
+    table = {n: v for n, v in table.items() if n == "time" or n in kept}
+    if man.torque:
+        table["left_wheel"], table["right_wheel"] = told[:, 1], told[:, 2]
+    return table
 
 
 def _chosen(trials: int) -> tuple[int, ...]:

@@ -122,10 +122,6 @@ def table(lines: Sequence[dict]) -> str:
         ("outside the library: seen, and no name", "", outside, lambda x: x["verdict"] in OPEN),
         ("crashes", "none", lines, lambda x: x["verdict"] == "error"),
     ]
-    counted = [
-        (what, aim, f"{sum(map(hit, of))} of {len(of)}" if of else "no case")
-        for what, aim, of, hit in rows
-    ]
     measured = [
         ("median size of the returned set", "<= 2", f"{_median(sizes):g}"),
         ("parameter error, median", "<= 5 %", f"{_median(errors):.1%}"),
@@ -134,8 +130,21 @@ def table(lines: Sequence[dict]) -> str:
         ("excess closed on the held-out trial, two effects", ">= 80 %", _closed(two)),
         ("seconds a study on one core, median", "", f"{_median(times):.0f}"),
     ]
-    body = "\n".join(f"| {a} | {b} | {c} |" for a, b, c in [*counted, *measured])
-    return "| figure | aim | result |\n|---|---|---|\n" + body
+    return markdown(("figure", "aim", "result"), [*counted(rows), *measured])
+
+
+def counted(rows: Sequence[tuple]) -> list[tuple[str, str, str]]:  # type: ignore[type-arg]
+    """Rows (what, aim, lines, whether a line is one) as (what, aim, how many of how many)."""
+    return [
+        (what, aim, f"{sum(map(hit, of))} of {len(of)}" if of else "no case")
+        for what, aim, of, hit in rows
+    ]
+
+
+def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table in Markdown."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 if __name__ == "__main__":

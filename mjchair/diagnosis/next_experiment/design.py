@@ -81,6 +81,7 @@ class Plan:
       chosen: name of the hypothesis that was rehearsed. rivals: names of the others.
       experiments: all. evidence: of the best, against each rival. torque: its largest, N m.
       dropped: a line for each rival or doubt that this chair cannot have.
+      run: of the study, from whose place and heading the manoeuvres start.
     """
 
     chosen: tuple[str, ...]
@@ -89,6 +90,7 @@ class Plan:
     evidence: tuple[Evidence, ...]
     torque: float = 0.0
     dropped: tuple[str, ...] = ()
+    run: str = ""
 
     @property
     def best(self) -> Experiment:
@@ -146,6 +148,7 @@ def plan(
         evidence=tuple(evidence),
         torque=here.largest(rehearsal.manoeuvres[best]),
         dropped=tuple(dropped),
+        run=here.run,
     )
 
 

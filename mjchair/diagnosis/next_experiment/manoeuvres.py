@@ -54,11 +54,13 @@ class Setting:
 
     Attributes:
       position: (x, y) m and heading (rad) of a start. torque: largest, N m; 0 where none is told.
+      run: name of the run that starts there.
     """
 
     position: tuple[float, float]
     heading: float
     torque: float
+    run: str = ""
 
     def initial(self, manoeuvre: Manoeuvre) -> Initial:
         """How the manoeuvre starts here."""
@@ -91,7 +93,8 @@ def setting(study: Study) -> Setting:
     first = first_state.initial(coast, study.axle)
     driven = [r.trial.inputs for r in runs if r.trial.inputs is not None]
     torque = float(np.median([_peak(inputs) for inputs in driven] or [0.0]))
-    return Setting(first.position or (0.0, 0.0), first.heading or 0.0, torque)
+    place = first.position or (0.0, 0.0)
+    return Setting(place, first.heading or 0.0, torque, coast.trial.name)
 
 
 def _peak(inputs: Inputs) -> float:
@@ -141,60 +144,96 @@ def _circle(time: Array) -> tuple[Array, Array]:
     return np.full_like(time, 0.05), np.full_like(time, 0.25)
 
 
-_SEAT = f" with {LOAD.mass:g} kg more on the seat, strapped down above the rear axle"
+_TURN = "in a turn to the {} that begins at 0.6 rad/s, a radius of about 2.2 m"
+_WAVES = "Drive a slalom from 1 m/s, to the right first, {:g} s a wave"
+_SEAT = (
+    f" with {LOAD.mass:g} kg more, strapped down above the rear axle, {LOAD.height:g} m over the "
+    "floor"
+)
 LIBRARY = (  # simplest first
     Manoeuvre("stand", "Let it stand with everything recording, brakes off, hands off"),
-    Manoeuvre("coast", "Coast as before, from 1.8 m/s, hands off the wheels", COAST),
+    Manoeuvre("coast", "Coast from 1.8 m/s, hands off the wheels", COAST),
     Manoeuvre(
         "coast reversed",
-        "Coast the other way over the same floor: start 6 m further, heading turned by 180 "
+        "Coast the other way over the same floor: start 6 m further ahead, heading turned by 180 "
         "degrees, from 1.8 m/s",
         COAST,
         np.pi,
         shift=(6.0, 0.0),
     ),
-    Manoeuvre("coast across", "Coast with the heading turned by 90 degrees", COAST, 0.5 * np.pi),
+    Manoeuvre(
+        "coast across",
+        "Coast from 1.8 m/s with the heading turned by 90 degrees to the left",
+        COAST,
+        0.5 * np.pi,
+    ),
     Manoeuvre("fast coast", "Coast from 3 m/s", 3.0),
     Manoeuvre("slow coast", "Coast from 0.8 m/s", 0.8),
     Manoeuvre("coast backwards", "Coast backwards from 0.5 m/s", -0.5, seconds=4.0),
-    Manoeuvre("coast in a left turn", "Coast from 1.3 m/s in a turn to the left", 1.3, 0.0, 0.6),
-    Manoeuvre("coast in a right turn", "Coast from 1.3 m/s in a turn to the right", 1.3, 0.0, -0.6),
-    Manoeuvre("coast a metre aside", "Coast with the start moved by 1 m", COAST, shift=(0.0, 1.0)),
-    Manoeuvre("free spin", "Turn it on the spot at about 1.5 rad/s and let go", yaw_rate=1.5),
-    Manoeuvre("pushes", "Push it straight with even strokes from 0.8 m/s", 0.8, torque=_strokes),
-    Manoeuvre("slow slalom", "Drive a slalom, 4 s a wave", 1.0, torque=_slalom(0.25)),
-    Manoeuvre("fast slalom", "Drive a slalom, 1.7 s a wave", 1.0, torque=_slalom(0.6)),
     Manoeuvre(
-        "short steps", "Drive straight with torque on and off, 0.5 s each", torque=_steps(0.5)
+        "coast in a left turn", "Coast from 1.3 m/s " + _TURN.format("left"), 1.3, yaw_rate=0.6
     ),
-    Manoeuvre("long steps", "Drive straight with torque on and off, 2 s each", torque=_steps(2.0)),
+    Manoeuvre(
+        "coast in a right turn", "Coast from 1.3 m/s " + _TURN.format("right"), 1.3, yaw_rate=-0.6
+    ),
+    Manoeuvre(
+        "coast a metre aside",
+        "Coast from 1.8 m/s with the start moved by 1 m to the left",
+        COAST,
+        shift=(0.0, 1.0),
+    ),
+    Manoeuvre(
+        "free spin", "Turn it on the spot to the left at about 1.5 rad/s and let go", yaw_rate=1.5
+    ),
+    Manoeuvre(
+        "pushes",
+        "Push it straight from 0.8 m/s with even strokes of 0.46 s, one every 1.15 s",
+        0.8,
+        torque=_strokes,
+    ),
+    Manoeuvre("slow slalom", _WAVES.format(4.0), 1.0, torque=_slalom(1.0 / 4.0)),
+    Manoeuvre("fast slalom", _WAVES.format(1.7), 1.0, torque=_slalom(1.0 / 1.7)),
+    Manoeuvre(
+        "short steps",
+        "Drive straight from a standstill, torque on and off, 0.5 s each",
+        torque=_steps(0.5),
+    ),
+    Manoeuvre(
+        "long steps",
+        "Drive straight from a standstill, torque on and off, 2 s each",
+        torque=_steps(2.0),
+    ),
     Manoeuvre(
         "reverse, then forward",
-        "Roll backwards at 0.5 m/s in a slight turn, then drive forward, so that the casters flip",
+        "Roll backwards at 0.5 m/s, turning at 0.2 rad/s to the left, and drive forward after half "
+        "a second, so that the casters flip",
         -0.5,
         yaw_rate=0.2,
         torque=_flip,
         seconds=4.0,
     ),
     Manoeuvre(
-        "driven spin", "Drive it on the spot, 3 s to the left and 3 s to the right", torque=_spin
+        "driven spin",
+        "Drive it on the spot from a standstill, 3 s to the left and 3 s to the right",
+        torque=_spin,
     ),
     Manoeuvre(
-        "circle", "Drive a steady circle to the left at 1 m/s", 1.0, yaw_rate=0.5, torque=_circle
+        "circle",
+        "Drive a circle to the left from 1 m/s and 0.5 rad/s, the right wheel with five times the "
+        "torque of the left",
+        1.0,
+        yaw_rate=0.5,
+        torque=_circle,
     ),
     Manoeuvre("loaded coast", "Coast from 1.8 m/s" + _SEAT, COAST, load=LOAD),
     Manoeuvre(
         "loaded coast in a turn",
-        "Coast from 1.3 m/s in a turn to the left" + _SEAT,
+        "Coast from 1.3 m/s " + _TURN.format("left") + _SEAT,
         1.3,
         yaw_rate=0.6,
         load=LOAD,
     ),
     Manoeuvre(
-        "loaded slalom",
-        "Drive a slalom, 4 s a wave," + _SEAT,
-        1.0,
-        torque=_slalom(0.25),
-        load=LOAD,
+        "loaded slalom", _WAVES.format(4.0) + _SEAT, 1.0, torque=_slalom(1.0 / 4.0), load=LOAD
     ),
 )

@@ -26,8 +26,7 @@ def deciding(plan: Plan, simulator: WindowSimulator) -> str:
     best = plan.best
     units = {c.name: c.unit for c in channels(simulator.base)}
     units |= {base_name(name): unit for name, unit in units.items()}
-    force = f", with up to {plan.torque:.2g} N m a wheel" if plan.torque else ""
-    said = [f"{best.manoeuvre.words}{force}; record {best.manoeuvre.seconds:g} s."]
+    said = [_what_to_do(plan)]
     pairs = zip(plan.chosen, plan.rivals, best.separations, plan.evidence, strict=True)
     for chosen, rival, t, evidence in pairs:
         said.append(f"It separates {plain(chosen)} from {plain(rival)} by {_sigmas(t)}.")
@@ -37,6 +36,23 @@ def deciding(plan: Plan, simulator: WindowSimulator) -> str:
     near = max(CLOSE * min(best.least, PLENTY), 1.0)
     others = [e for e in plan.experiments[1:2] if e.least > near]
     said += [f"Or {_lower(e.manoeuvre.words)} ({_sigmas(e.least)})." for e in others]
+    return " ".join(said)
+
+
+def _what_to_do(plan: Plan) -> str:
+    """The manoeuvre, where it starts, for how long, and what study.toml must be told of it."""
+    manoeuvre = plan.best.manoeuvre
+    force = f", with up to {plan.torque:.2g} N m a wheel" if plan.torque else ""
+    torques = " and the torque of each" if plan.torque else ""
+    said = [f"{manoeuvre.words}{force}; record {manoeuvre.seconds:g} s{torques}."]
+    if plan.run:
+        moved = any(manoeuvre.shift) or manoeuvre.turned
+        but = ", but for what is said here of start and heading" if moved else ""
+        said.append(f"Start where {plan.run} starts, with its heading{but}.")
+    if manoeuvre.load is not None:
+        load = manoeuvre.load
+        told = f"mass = {load.mass:g} and height = {load.height:g}"
+        said.append(f"In study.toml the trial gets a [trial.load] with {told}.")
     return " ".join(said)
 
 
