@@ -332,9 +332,9 @@ class LinearSearch(search.Search):
             return None
         return _fit(self.base, hypothesis)
 
-    def anew(self, fitted: Any) -> Any:
+    def anew(self, tried: Any) -> Any:
         """The fit itself: a linear system is the same around any chair."""
-        return fitted
+        return tried.fitted
 
 
 def _fit(base: Any, hypothesis: Hypothesis) -> Any:

@@ -11,7 +11,9 @@ from scipy.optimize import lsq_linear
 
 import mjchair
 from mjchair.cli import main
+from mjchair.diagnosis import rules
 from mjchair.diagnosis.diagnose import diagnose
+from mjchair.diagnosis.explain import event
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import RoughlyKnown
@@ -71,6 +73,13 @@ def test_a_slope_is_found_with_its_size(slope):
     assert found["verdict"] in ("named", "ambiguous")
     assert "floor_slope" in names
     assert found["gap"]["after"] < 0.5 * (found["gap"]["before"] + 1.0)
+
+
+def test_a_slope_that_every_run_shows_is_no_event(slope):
+    stages = DIAGNOSES[-1].stages
+    brings = event.largest(stages.base)
+    assert brings > 0.0
+    assert not rules.happened_once(event=brings, gain=stages.choice.hypothesis.gain)
 
 
 def test_the_corrected_chair_rolls_on_as_on_the_slope(slope):

@@ -105,6 +105,15 @@ def test_a_clear_effect_is_nearly_certain():
     assert of_effects(known, ["rolling_resistance"]) > 0.99
 
 
+def test_a_linear_gain_that_the_fitted_chair_has_already_speaks_for_nothing():
+    """A force gains 400 by linear algebra, of which the chair without effects takes 390."""
+    made = base(2.0, force=2.0)
+    assert probabilities(made, chosen(made, "rolling_resistance"))[OUTSIDE] > 0.1
+    made.plain.total -= 390.0
+    known = probabilities(made, chosen(made, "rolling_resistance"))
+    assert of_effects(known, ["rolling_resistance"]) > 0.99
+
+
 def test_effects_that_look_alike_share_it_the_common_one_first():
     made = base(2.0, alike=0.9999)
     known = probabilities(made, chosen(made, "rolling_resistance", ["caster_trail"]))

@@ -193,18 +193,9 @@ def test_what_is_below_the_limit_does_not_matter(changes, matters):
     assert rules.matters(**{**known, **changes}) == matters
 
 
-@pytest.mark.parametrize(
-    ("gains", "runs", "once"),
-    [
-        ([0.0, 90.0, 5.0, 1.0, 1.0], [0, 0, 1, 1, 2], True),
-        ([0.0, 60.0, 40.0, 1.0, 1.0], [0, 0, 0, 1, 1], True),  # two windows of one run
-        ([0.0, 60.0, 1.0, 40.0, 1.0], [0, 0, 0, 1, 1], False),  # another pass shows it as well
-        ([30.0, 30.0, 30.0, 20.0, 20.0], [0, 0, 0, 1, 1], False),
-        ([90.0, 5.0], [0, 0], False),  # of two windows one is half of all
-    ],
-)
-def test_what_few_windows_of_one_run_carry_happened_once(gains, runs, once):
-    assert rules.happened_once(np.array(gains), np.array(runs)) == once
+def test_an_event_stands_beside_an_effect_that_brings_little_more():
+    assert rules.happened_once(event=85.0, gain=100.0)
+    assert not rules.happened_once(event=75.0, gain=100.0)
 
 
 def test_a_number_is_believed_that_data_tell_better_than_its_bounds():

@@ -16,7 +16,7 @@ from mjchair.errors import MjchairError
 
 
 def effect(name):
-    return SimpleNamespace(effect=SimpleNamespace(key=name), free=("size",))
+    return SimpleNamespace(effect=SimpleNamespace(key=name, common=1.0), free=("size",))
 
 
 ROLLING, MOTOR = effect("rolling"), effect("motor")
@@ -30,7 +30,8 @@ def fit(total, *keys, promised=None):
         total=total,
         promised=total if promised is None else promised,
         variant=Variant((), terms=terms),
-        track=f"track of {'+'.join(keys)}",
+        track=f"track of {'+'.join(sorted(keys))}",
+        sigmas=dict.fromkeys(keys, 3.0),
     )
 
 
@@ -93,3 +94,39 @@ def test_a_fit_that_still_promises_is_made_anew(fits):
     fits.answers[("rolling", "as given")] = fit(1530.0, "rolling", promised=1500.0)
     fits.answers[("rolling", "track of rolling")] = fit(1501.0, "rolling")
     assert searching().fit(ONE).fitted.total == 1501.0
+
+
+def test_a_gap_is_laid_to_a_further_effect_only_once_the_first_is_fitted_anew(fits, monkeypatch):
+    """With columns that are too old a second effect seems to bring much, and brings nothing."""
+    first, anew = fit(1500.0, "rolling"), fit(1110.0, "rolling")
+    fits.answers[("rolling", "as given")] = first
+    fits.answers[("rolling", "track of rolling")] = anew
+    monkeypatch.setattr(search.hypotheses, "singles", lambda *_: [ONE])
+    monkeypatch.setattr(search.hypotheses, "pairs", lambda *_: [BOTH])
+    monkeypatch.setattr(search, "gap_after", lambda _, f: SimpleNamespace(exists=f is first))
+    monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
+    monkeypatch.setattr(search, "_believable", lambda _: True)
+    monkeypatch.setattr(search, "_replacements", lambda *_: [])
+    base = searching().base
+    base.starts = ()
+    chosen = search.choose(base, SimpleNamespace(exists=True), lambda line: None)
+    assert chosen.hypothesis is ONE and chosen.fitted is anew
+    assert "motor+rolling" not in {keys for keys, _ in fits.asked}
+
+
+def test_an_effect_that_brings_nothing_once_all_is_made_anew_is_dropped(fits, monkeypatch):
+    fits.answers.update(
+        {
+            ("rolling", "as given"): fit(1200.0, "rolling"),
+            ("rolling", "track of rolling"): fit(1110.0, "rolling"),
+            ("motor+rolling", "as given"): fit(1105.0, "rolling", "motor"),
+            ("motor+rolling", "track of motor+rolling"): fit(1104.0, "rolling", "motor"),
+            ("motor", "as given"): None,
+        }
+    )
+    monkeypatch.setattr(
+        search.hypotheses, "weigh", lambda _, starts: Hypothesis(tuple(starts), 870.0, 850.0)
+    )
+    looking = searching()
+    chosen = looking.without_needless(looking.fit(BOTH))
+    assert chosen.hypothesis.keys == ("rolling",)

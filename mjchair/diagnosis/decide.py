@@ -14,7 +14,7 @@ from scipy import stats
 
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.evidence import evidence, missing_forces
-from mjchair.diagnosis.explain import hypotheses, missing_force
+from mjchair.diagnosis.explain import event, hypotheses, missing_force
 from mjchair.diagnosis.explain.choice import Choice, closure, gain
 from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.explain.gap import Gap, forces_left
@@ -127,11 +127,8 @@ def standing(
 
 
 def _once(base: Base, choice: Choice) -> bool:
-    """Whether something that happened once, in one run, fits as well as the effects do."""
-    windows = base.bench.windows
-    return rules.happened_once(
-        base.plain.chi2 - choice.fitted.chi2, base.system.run[windows].astype(np.int64)
-    )
+    """Whether something that happened once, in one run, fits about as well as the effects do."""
+    return rules.happened_once(event=event.largest(base), gain=choice.hypothesis.gain)
 
 
 def _walls(choice: Choice) -> list[str]:

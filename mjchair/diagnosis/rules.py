@@ -43,9 +43,7 @@ SMALL_GAP = 2.0  # rms of the residual over the noise up to which a gap may be n
 CERTAIN = 10.0  # standard errors beyond which an effect is named whatever its size
 MATERIAL = 0.12  # of the chair's own rolling resistance: a force that matters (assumption)
 # what happens once
-CARRIES = 0.8  # share of the gain
-FEW = 2  # windows of one run that carry that share: an event in time fits as well
-MANY = 5  # windows of a study in which few can be told from all
+CARRIES = 0.8  # share of the gain that an event must bring to stand beside an effect
 # what is believed of a parameter
 SIZES = 5.0  # sizes worth finding: a standard error above tells nothing
 
@@ -192,18 +190,13 @@ def matters(
     return not told and (gap >= SMALL_GAP or certain)
 
 
-def happened_once(gains: Array, runs: NDArray[np.int64]) -> bool:
-    """Whether so few windows of one run carry an effect that an event in time does as well.
+def happened_once(*, event: float, gain: float) -> bool:
+    """Whether an event in time carries about what the effects do.
 
     Args:
-      gains: (windows,) chi2 that the effect brings. runs: (windows,) of which run each is.
+      event: chi2 that forces bring which act for a moment in one run. gain: that the effects bring.
     """
-    total = float(gains.sum())
-    if gains.size < MANY or total <= 0.0:
-        return False
-    first = np.argsort(-gains)[:FEW]
-    mine = first[runs[first] == runs[first[0]]]
-    return float(gains[mine].sum()) > CARRIES * total
+    return event > CARRIES * gain
 
 
 def believable(*, std: float, change: float, width: float) -> bool:

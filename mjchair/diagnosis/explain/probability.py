@@ -74,14 +74,15 @@ def weights(base: Base, choice: Choice | None) -> dict[str, Weight]:
     one = 1.0 - PRIOR_NONE - PRIOR_TWO - PRIOR_OUTSIDE
     out = {
         NONE: Weight(math.log(PRIOR_NONE), 0.0, True),
-        OUTSIDE: Weight(math.log(PRIOR_OUTSIDE), _outside(reduced), True),
+        OUTSIDE: Weight(math.log(PRIOR_OUTSIDE), _outside(reduced) - 0.5 * _overstated(base), True),
     }
     kept = _kept(base, choice)
 
     def add(h: Hypothesis, prior: float) -> None:
         name = _name(h)
         share = math.prod(keys[k] / everything for k in h.keys) * math.factorial(len(h.keys))
-        evidence = _evidence(reduced, h, kept.get(name), starts)
+        gained = kept.get(name, h.gain - _overstated(base))
+        evidence = _evidence(reduced, h, gained, starts)
         if name not in out or evidence > out[name].evidence:
             out[name] = Weight(math.log(prior * share), evidence, name in kept)
 
@@ -104,18 +105,24 @@ def _kept(base: Base, choice: Choice | None) -> dict[str, float]:
     return fits
 
 
-def _evidence(
-    reduced: Reduced, h: Hypothesis, fitted: float | None, starts: Sequence[Start]
-) -> float:
-    """Logarithm of the evidence over that of nothing."""
+def _overstated(base: Base) -> float:
+    """Chi2 by which linear algebra begins above the chair without effects, once that is fitted.
+
+    Where what is only roughly known lies far away, columns stand around the chair as given, and
+    every linear gain counts what the fit of these numbers alone brings.
+    """
+    return max(0.0, base.reduced.total - base.plain.total)
+
+
+def _evidence(reduced: Reduced, h: Hypothesis, gained: float, starts: Sequence[Start]) -> float:
+    """Logarithm of the evidence over that of nothing; `gained` is chi2."""
     which = reduced.index(h.columns)
     spread = np.concatenate([_spread(s) for s in h.starts])
     inner = np.eye(len(which)) + spread[:, None] * reduced.G[np.ix_(which, which)] * spread
     size = reduced.solve(which) / spread
-    told = h.gain if fitted is None else fitted
     looked = sum(math.log(_places(s, starts)) for s in h.starts)
     priced = 0.5 * float(np.linalg.slogdet(inner)[1]) + 0.5 * float(np.minimum(size**2, 9.0).sum())
-    return 0.5 * told - priced - looked
+    return 0.5 * gained - priced - looked
 
 
 def _places(start: Start, starts: Sequence[Start]) -> int:

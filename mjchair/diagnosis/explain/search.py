@@ -62,17 +62,19 @@ def choose(base: Base, gap: Gap, say: Say) -> Choice | None:
         top = search.best_of(options[size - 1])
         if top is None:
             continue
-        if best is not None and not _worth(base, best, top[0]):
+        if best is not None and not search.is_worth(best, top[0]):
             break
-        best = top[0]
-        after.append(top[1])
-        if not after[-1].exists:
+        best, left = top
+        if left.exists:  # a gap is not laid to a further effect before this one is fitted well
+            left = gap_after(base, search.anew(best))
+        after.append(left)
+        if not left.exists:
             break
     if best is None:
         return None
     best, rivals = search.against_rivals(search.without_needless(best))
     say("the last fit, with everything made anew around it")
-    fitted = search.anew(best.fitted)
+    fitted = search.anew(best)
     after[-1] = gap_after(base, fitted)
     return Choice(
         hypothesis=best.hypothesis,
@@ -84,22 +86,13 @@ def choose(base: Base, gap: Gap, say: Say) -> Choice | None:
     )
 
 
-def _worth(base: Base, best: Tried, more: Tried) -> bool:
-    """Whether a larger hypothesis brings enough."""
-    held = held_out(base.bench, with_terms(best.fitted), with_terms(more.fitted))
-    return rules.worth_adding(
-        gained=best.fitted.total - more.fitted.total,
-        parameters=more.hypothesis.free - best.hypothesis.free,
-        held=float(held.sum()),
-    )
-
-
 class Search:
     """Fits hypotheses, and notes those that cannot be.
 
     Attributes:
       base: around which. dropped: a line for each hypothesis that this chair cannot have.
       tried: every fit that was made. impossible: starts of those that this chair cannot have.
+      again: of some of them, the fit with everything made anew around it.
     """
 
     def __init__(self, base: Base, say: Say) -> None:
@@ -108,6 +101,7 @@ class Search:
         self.dropped: list[str] = []
         self.tried: list[Rival] = []
         self.impossible: list[tuple[Start, ...]] = []
+        self.again: list[Rival] = []
 
     def best_of(self, options: Sequence[Hypothesis]) -> tuple[Tried, Gap] | None:
         """The best hypothesis with its fit, and the gap that it leaves; None: none can be.
@@ -148,10 +142,23 @@ class Search:
         )
         return None
 
+    def is_worth(self, best: Tried, more: Tried) -> bool:
+        """Whether a larger hypothesis brings enough; both with everything made anew."""
+        one, other = self.anew(best), self.anew(more)
+        held = held_out(self.base.bench, with_terms(one), with_terms(other))
+        return rules.worth_adding(
+            gained=one.total - other.total,
+            parameters=more.hypothesis.free - best.hypothesis.free,
+            held=float(held.sum()),
+        )
+
     def without_needless(self, tried: Tried) -> Tried:
         """The hypothesis without the effects that it can do without."""
-        hypothesis, fitted = tried.hypothesis, tried.fitted
-        for start in hypothesis.starts if len(hypothesis.starts) > 1 else ():
+        hypothesis = tried.hypothesis
+        if len(hypothesis.starts) == 1:
+            return tried
+        fitted = self.anew(tried)
+        for start in hypothesis.starts:
             rest = [s for s in hypothesis.starts if s is not start]
             fewer = hypotheses.weigh(self.base.reduced, rest)
             parameters = hypothesis.free - fewer.free
@@ -164,7 +171,7 @@ class Search:
             other = self.fit(fewer)
             if other is None:
                 continue
-            lost = other.fitted.total - fitted.total
+            lost = self.anew(other).total - fitted.total
             if rules.can_be_dropped(lost=lost, parameters=parameters):
                 return self.without_needless(other)
         return tried
@@ -211,9 +218,9 @@ class Search:
         Returns:
           None where this chair cannot have these effects; that is noted.
         """
-        known = next((t for t in self.tried if t.hypothesis.starts == hypothesis.starts), None)
+        known = _of(hypothesis, self.tried)
         if known is not None:
-            return Tried(hypothesis, known.fitted)
+            return Tried(hypothesis, known)
         if hypothesis.starts in self.impossible:
             return None
         self.say("fit of " + " and ".join(hypothesis.keys))
@@ -251,7 +258,8 @@ class Search:
         With one effect more nothing fits worse, so a fit that does has gone astray.
         """
         keys = set(hypothesis.keys)
-        parts = [t.fitted for t in self.tried if set(t.hypothesis.keys) < keys]
+        every = (*self.tried, *self.again)
+        parts = [t.fitted for t in every if set(t.hypothesis.keys) < keys]
         part = min(parts, key=lambda f: f.total, default=None)
         if part is None or (fitted is not None and fitted.total <= part.total):
             return fitted
@@ -314,9 +322,15 @@ class Search:
         again = self._made_anew(replace(fitted.variant, offsets={}), fitted.track)
         return fitted if again is None else min(fitted, again, key=lambda f: f.total)
 
-    def anew(self, fitted: Fitted) -> Fitted:
+    def anew(self, tried: Tried) -> Fitted:
         """The fit with everything made anew around it; the fit itself where that cannot be."""
-        return self._made_anew(fitted.variant, fitted.track, "the last fit") or fitted
+        hypothesis, first = tried.hypothesis, tried.fitted
+        known = _of(hypothesis, self.again)
+        if known is None:
+            name = f"the fit of {' and '.join(hypothesis.keys)}"
+            known = self._made_anew(first.variant, first.track, name) or first
+            self.again.append(Rival(hypothesis, known))
+        return known
 
     def _made_anew(self, start: Variant, before: Track, noted: str = "") -> Fitted | None:
         """The fit from a variant, all columns made there; None: no chair can be so.
@@ -330,6 +344,11 @@ class Search:
             if noted:
                 self._note(f"{noted} was not made anew: {error}")
             return None
+
+
+def _of(hypothesis: Hypothesis, fits: Sequence[Rival]) -> Fitted | None:
+    """The fit of a hypothesis among others; None: it is not there."""
+    return next((t.fitted for t in fits if t.hypothesis.starts == hypothesis.starts), None)
 
 
 def _believable(fitted: Fitted) -> bool:
