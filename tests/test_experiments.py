@@ -97,6 +97,30 @@ def test_a_load_tells_rolling_from_bearings(one_way):
     assert found.chosen == ("rolling_resistance",) and found.rivals == ("bearing_friction",)
 
 
+def test_without_rivals_a_force_of_any_course_is_the_rival(one_way):
+    _, _, bench, (rolling, _, _) = one_way
+    few = [BY_NAME["coast"], BY_NAME["free spin"]]
+    found = design.plan(bench, rolling, [], few)
+    along = next(i for i, name in enumerate(found.rivals) if "along the way" in name)
+    t = {e.manoeuvre.name: e.separations for e in found.experiments}
+    # a force along the way does in a coast what rolling resistance does, and cannot stop a spin
+    assert t["coast"][along] < 0.05 * t["coast"][1 - along]
+    assert t["free spin"][along] > 2.0 * t["coast"][along]
+    assert "from a force along the way from outside" in wording.deciding(found, bench.simulator)
+
+
+def test_what_must_be_large_is_not_the_simplest(one_way):
+    _, _, bench, (rolling, slope, _) = one_way
+    few = [BY_NAME["coast across"], BY_NAME["coast reversed"]]
+    either = [replace(m, seconds=s) for m, s in zip(few, (4.0, 6.0), strict=True)]
+    found = design.plan(bench, rolling, [slope], either, doubts=(), needed=[1e6])
+    assert found.best.manoeuvre.name == "coast reversed"
+    assert found.best.least == max(e.least for e in found.experiments)
+    assert "repetitions" in wording.deciding(found, bench.simulator)
+    simple = design.plan(bench, rolling, [slope], either, doubts=(), needed=[9.0])
+    assert simple.best.least > design.PLENTY and simple.best.manoeuvre.name == "coast across"
+
+
 def test_nothing_separates_a_chair_from_itself(one_way):
     _, _, bench, (rolling, _, _) = one_way
     few = [BY_NAME["coast reversed"], BY_NAME["loaded coast"]]

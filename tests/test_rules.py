@@ -198,6 +198,17 @@ def test_an_event_stands_beside_an_effect_that_brings_little_more():
     assert not rules.happened_once(event=75.0, gain=100.0)
 
 
+def test_what_is_needed_of_a_further_run_decides():
+    more = rules.to_show_again(event=900.0, gain=908.0)
+    for share, once in ((0.99, True), (1.01, False)):
+        assert rules.happened_once(event=900.0, gain=908.0 + share * more) == once
+    behind, gain = 20.0, 5000.0
+    more = rules.to_rule_out(behind=behind, gain=gain)
+    for share, stays in ((0.99, True), (1.01, False)):
+        far = behind + share * more
+        assert stays == rules.stays_a_rival(behind=far, gain=gain, errors=9.0, beyond_bound=False)
+
+
 def test_a_number_is_believed_that_data_tell_better_than_its_bounds():
     assert rules.believable(std=0.9, change=0.2, width=10.0)
     assert not rules.believable(std=1.0, change=0.2, width=10.0)  # five sizes worth finding

@@ -54,7 +54,7 @@ def one(args: argparse.Namespace, number: int, threads: int) -> dict:
         perform(study, case, seed, found, plan, len(line["experiments"]) + 1)
         again, said = diagnosed(study, threads)
         if again is not None:
-            experiment["shown"] = shown(found.stages, again.stages)
+            experiment["shown"] = shown(plan, found.stages, again.stages)
         line["diagnoses"].append(said)
         line["experiments"].append(experiment)
         found = again
@@ -94,13 +94,15 @@ def _torque(man: manoeuvres.Manoeuvre, most: float):  # type: ignore[no-untyped-
     return torque
 
 
-def shown(before: Stages, after: Stages) -> list[float | None]:
+def shown(plan: Plan, before: Stages, after: Stages) -> list[float | None]:
     """By how many sigmas each rival fell further behind: sqrt of what its chi2 lost, 0 if it won.
 
-    None: a rival that could not be fitted again.
+    None: a rival that could not be fitted again. A force outside the library has no fit.
     """
     choice = before.choice
     rivals = [r.fitted for group in choice.rivals for r in group]
+    if (rivals and len(plan.rivals) > len(rivals)) or plan.rivals == ("no further effect",):
+        rivals.append(before.base.plain)  # beside something that happened once
     out: list[float | None] = []
     try:
         chosen = again(choice.fitted, after)
@@ -119,6 +121,8 @@ def shown(before: Stages, after: Stages) -> list[float | None]:
 def again(fitted: Fitted, after: Stages) -> float:
     """Chi2 of the same effects on the study that has one trial more."""
     keys = sorted(t.effect.key for t in fitted.variant.terms)
+    if not keys:
+        return after.base.plain.total
     tried = after.choice.tried if after.choice else []
     known = [t.fitted.total for t in tried if list(t.hypothesis.keys) == keys]
     if known:

@@ -159,9 +159,15 @@ def _held_out(base: Base, fitted: Fitted) -> rules.HeldOut | None:
 
 def _plan(base: Base, choice: Choice) -> tuple[Plan | None, list[str]]:
     """The experiments that would decide, and lines on what could not be planned."""
-    near = [r.fitted for group in choice.rivals for r in group] or [base.plain]
+    chosen = choice.fitted
+    gained = gain(base, chosen)
+    near = [r.fitted for group in choice.rivals for r in group]
+    needed = [rules.to_rule_out(behind=r.total - chosen.total, gain=gained) for r in near]
+    if _once(base, choice):
+        near.append(base.plain)
+        needed.append(rules.to_show_again(event=event.largest(base), gain=choice.hypothesis.gain))
     try:
-        plan = design.plan(base.bench, choice.fitted, near)
+        plan = design.plan(base.bench, chosen, near, needed=needed)
     except MjchairError as error:
         return None, [str(error)]
     return plan, list(plan.dropped)

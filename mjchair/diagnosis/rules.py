@@ -292,6 +292,24 @@ def stays_a_rival(*, behind: float, gain: float, errors: float, beyond_bound: bo
     return not beyond_bound and (behind < max(RIVAL_CHI2, FORM * gain) or errors < RIVAL_ERRORS)
 
 
+def to_rule_out(*, behind: float, gain: float) -> float:
+    """Chi2 that a further run must bring against a rival, so that it stays none.
+
+    Args:
+      behind, gain: as `stays_a_rival` takes them.
+    """
+    return max(max(RIVAL_CHI2, FORM * gain) - behind, RIVAL_CHI2)
+
+
+def to_show_again(*, event: float, gain: float) -> float:
+    """Chi2 that a further run must bring, so that no event in time carries about as much.
+
+    Args:
+      event, gain: as `happened_once` takes them.
+    """
+    return max(event / CARRIES - gain, RIVAL_CHI2)
+
+
 def paired_errors(theirs: Array, ours: Array) -> float:
     """By how many standard errors, over windows, `theirs` is worse; chi2 of each, (windows,)."""
     difference = theirs - ours

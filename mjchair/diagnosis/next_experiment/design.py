@@ -13,12 +13,13 @@ from the present ones would promise what only the model says.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.diagnosis.fit.bench import Bench
+from mjchair.diagnosis.fit.column_ids import ColumnId
 from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.variant import Variant
 from mjchair.diagnosis.next_experiment.manoeuvres import Manoeuvre, possible, setting
@@ -27,8 +28,11 @@ from mjchair.diagnosis.next_experiment.separation import (
     Doubts,
     Separated,
     nuisance_answers,
+    outside_answers,
     separation,
 )
+from mjchair.diagnosis.replay.derivatives import Column
+from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.replay.sampling import residual
 from mjchair.effects.effect import Effect
 from mjchair.effects.library import library
@@ -36,8 +40,15 @@ from mjchair.errors import MjchairError
 
 Array = NDArray[np.float64]
 SMOOTH = 0.5  # s, over which a person would average a channel
-# chi2, ten sigmas: T is linear, and above this a simple manoeuvre is worth more than a larger T
-PLENTY = 100.0
+# a force of any course that no effect makes
+OUTSIDE = {
+    Force.FORWARD: "a force along the way from outside the library",
+    Force.YAW: "a turning moment from outside the library",
+}
+ENOUGH = 9.0  # chi2, three sigmas, that decide
+# chi2, ten sigmas, or three times what is needed: T is linear, and above this a simple manoeuvre is
+# worth more than a larger T
+PLENTY, MARGIN = 100.0, 3.0
 
 
 @dataclass(frozen=True)
@@ -79,18 +90,21 @@ class Plan:
 
     Attributes:
       chosen: name of the hypothesis that was rehearsed. rivals: names of the others.
-      experiments: all. evidence: of the best, against each rival. torque: its largest, N m.
+      experiments: all. evidence: of the best, against each rival; None: a force has none.
+      torque: its largest, N m.
       dropped: a line for each rival or doubt that this chair cannot have.
       run: of the study, from whose place and heading the manoeuvres start.
+      needed: T against each rival that decides, chi2.
     """
 
     chosen: tuple[str, ...]
     rivals: tuple[str, ...]
     experiments: tuple[Experiment, ...]
-    evidence: tuple[Evidence, ...]
+    evidence: tuple[Evidence | None, ...]
     torque: float = 0.0
     dropped: tuple[str, ...] = ()
     run: str = ""
+    needed: tuple[float, ...] = ()
 
     @property
     def best(self) -> Experiment:
@@ -104,16 +118,20 @@ def plan(
     rivals: Sequence[Fitted],
     manoeuvres: Sequence[Manoeuvre] | None = None,
     doubts: Sequence[Effect] | None = None,
+    needed: Sequence[float] | None = None,
 ) -> Plan:
     """Rehearse the manoeuvres and rank them by the smallest T over the rivals.
 
-    Of those that separate by PLENTY, the one that stands first is taken, as the simplest.
+    Of those that separate by PLENTY, and by MARGIN times what is needed, the one that stands first
+    is taken, as the simplest.
 
     Args:
-      bench: of the study. chosen: the chair that is rehearsed. rivals: at least one, each a fit.
+      bench: of the study. chosen: the chair that is rehearsed.
+      rivals: each a fit; none: the chosen effects are held against a force outside the library.
       manoeuvres: to choose from, simplest first; None: all of the library that this lab can make.
       doubts: effects that may be there besides, at their typical size; None: those of the library
         that every chair has a little of.
+      needed: T against each rival that rules it out, chi2; None: three sigmas.
 
     Raises:
       MjchairError: the chosen chair cannot be rehearsed, or no rival can.
@@ -122,34 +140,93 @@ def plan(
     rehearsal = Rehearsal(bench, here, manoeuvres or possible(here), version(chosen))
     doubted = Doubts(bench, rehearsal, chosen, _doubted(chosen, rivals, doubts))
     answers = {**nuisance_answers(rehearsal, chosen), **doubted.answers}
-    kept: list[tuple[Fitted, Separated]] = []
+    kept: list[_Against] = []
     dropped = list(doubted.dropped)
-    for rival in rivals:
+    for rival, enough in zip(rivals, needed or [ENOUGH] * len(rivals), strict=True):
+        ours, theirs = (
+            distinct(chosen.variant, rival.variant),
+            distinct(rival.variant, chosen.variant),
+        )
         try:
-            kept.append((rival, separation(rehearsal, bench, rival, answers, doubted.columns)))
+            far = separation(rehearsal, bench, rival, answers, doubted.columns)
         except (MjchairError, np.linalg.LinAlgError) as error:
-            dropped.append(f"{distinct(rival.variant, chosen.variant)} was not rehearsed: {error}")
+            dropped.append(f"{theirs} was not rehearsed: {error}")
+            continue
+        kept.append(_Against(ours, theirs, enough, far, rival))
+    if not rivals:
+        kept = _forces(bench, rehearsal, chosen, answers, doubted)
     if not kept:
         raise MjchairError("no experiment can be planned: " + "; ".join(dropped))
     experiments = [
-        Experiment(m, tuple(float(s.least[i]) for _, s in kept))
+        Experiment(m, tuple(float(k.far.least[i]) for k in kept))
         for i, m in enumerate(rehearsal.manoeuvres)
     ]
-    order = sorted(range(len(experiments)), key=lambda i: (-min(experiments[i].least, PLENTY), i))
+    needs = [k.needed for k in kept]
+    order = sorted(range(len(experiments)), key=lambda i: (-_share(experiments[i], needs), i))
     best = order[0]
+    rehearsed = version(chosen)
     evidence = [
-        _evidence(rehearsal, bench, best, version(chosen), version(rival, s.steps[best]))
-        for rival, s in kept
+        None
+        if k.rival is None
+        else _evidence(rehearsal, bench, best, rehearsed, version(k.rival, k.far.steps[best]))
+        for k in kept
     ]
     return Plan(
-        chosen=tuple(distinct(chosen.variant, rival.variant) for rival, _ in kept),
-        rivals=tuple(distinct(rival.variant, chosen.variant) for rival, _ in kept),
+        chosen=tuple(k.chosen for k in kept),
+        rivals=tuple(k.name for k in kept),
         experiments=tuple(experiments[i] for i in order),
         evidence=tuple(evidence),
         torque=here.largest(rehearsal.manoeuvres[best]),
         dropped=tuple(dropped),
         run=here.run,
+        needed=tuple(needs),
     )
+
+
+@dataclass(frozen=True)
+class _Against:
+    """A rival in every manoeuvre.
+
+    Attributes:
+      chosen, name: of what is chosen and of the rival. needed: T that rules it out, chi2.
+      far: how far it stays behind. rival: its fit; None: a force of any course.
+    """
+
+    chosen: str
+    name: str
+    needed: float
+    far: Separated
+    rival: Fitted | None
+
+
+def _forces(
+    bench: Bench,
+    rehearsal: Rehearsal,
+    chosen: Fitted,
+    answers: dict[ColumnId, Column],
+    doubted: Doubts,
+) -> list[_Against]:
+    """The chosen effects against a force that no effect makes, in their place."""
+    nothing = replace(chosen.variant, terms=())
+    name = distinct(chosen.variant, nothing)
+    out = []
+    for force, words in OUTSIDE.items():
+        further, columns = outside_answers(rehearsal, chosen, force)
+        far = separation(
+            rehearsal,
+            bench,
+            replace(chosen, variant=nothing),
+            {**answers, **further},
+            {**doubted.columns, **columns},
+        )
+        out.append(_Against(name, words, ENOUGH, far, None))
+    return out
+
+
+def _share(experiment: Experiment, needed: Sequence[float]) -> float:
+    """The smallest T over the rivals beside what is plenty against each, at most 1."""
+    pairs = zip(experiment.separations, needed, strict=True)
+    return min(min(t / max(PLENTY, MARGIN * least), 1.0) for t, least in pairs)
 
 
 def _doubted(

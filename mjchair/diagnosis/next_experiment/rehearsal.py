@@ -190,6 +190,12 @@ class Rehearsal:
         """What each chair's channels show of every window, from the states of the track."""
         return self._predict(chairs, self.track.states)
 
+    def traces(self, chair: Version) -> list[dict[str, Array]]:
+        """States of the chair along every window, from the states of the track."""
+        model = self.simulator.compile(chair.variant.edit)
+        pairs = zip(self.simulator.windows, self.track.states, strict=True)
+        return [o.trace for o in self.simulator.run([Job(model, *p) for p in pairs], trace=True)]
+
     def _predict(self, chairs: Sequence[Version], states: Sequence[State]) -> list[Column]:
         simulator = self.simulator
         different = {c.mechanics: c for c in chairs}

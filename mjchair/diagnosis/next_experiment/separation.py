@@ -16,6 +16,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from mjchair.diagnosis.explain.probability import SPREAD
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ColumnId, RoughlyKnown
@@ -25,12 +26,14 @@ from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.fit.variant import Term, Variant, nudged
 from mjchair.diagnosis.next_experiment.rehearsal import Rehearsal, version
 from mjchair.diagnosis.replay.derivatives import Column, Point, differences
+from mjchair.diagnosis.replay.pulses import Force, Pulse, pulse_answers
 from mjchair.diagnosis.replay.sampling import residual
 from mjchair.effects.effect import Effect, SensorError
 from mjchair.effects.effect import step as typical_step
 from mjchair.errors import MjchairError
 
 Array = NDArray[np.float64]
+APART = 0.5  # s, between peaks of a force of any course
 PHASE = math.pi / math.sqrt(3.0)  # rad, standard deviation of a phase that starts anew each run
 
 
@@ -211,6 +214,32 @@ def doubt_column(bench: Bench, chosen: Fitted, effect: Effect) -> Column:
     errors = chosen.variant.sensor_errors(simulator.channels)
     (column,) = differences(simulator, chosen.track, points, chosen.variant.edit, errors)
     return column
+
+
+def outside_answers(
+    rehearsal: Rehearsal, chosen: Fitted, force: Force
+) -> tuple[dict[ColumnId, Column], dict[ColumnId, Column]]:
+    """Columns of a force of any course, in the manoeuvres and in the present data, where it is nil.
+
+    The present data hold nothing of what it does in another run, so that it is free there, with the
+    size that a force outside the library has beforehand.
+    """
+    simulator, chair = rehearsal.simulator, version(chosen)
+    asked, names = [], []
+    for i, w in enumerate(simulator.windows):
+        count = max(2, round((w.last - w.first) / APART) + 1)
+        times = np.linspace(w.first, w.last, count)
+        asked += [Pulse(force, i, float(t), float(times[1] - times[0])) for t in times]
+        names += [RoughlyKnown(f"outside:{force}:{w.index}:{k}") for k in range(count)]
+    track = replace(rehearsal.track, trace=rehearsal.traces(chair))
+    found = pulse_answers(simulator, track, asked, chair.variant.edit)
+    answers: dict[ColumnId, Column] = {
+        name: [np.zeros_like(y) for y in track.predicted] for name in names
+    }
+    for name, pulse, answer in zip(names, asked, found, strict=True):
+        answers[name][pulse.window] = SPREAD[force] * answer
+    nothing = [np.zeros_like(y) for y in chosen.track.predicted]
+    return answers, dict.fromkeys(answers, nothing)
 
 
 def _typical(effect: Effect) -> Term:

@@ -9,12 +9,11 @@ import math
 from collections.abc import Sequence
 
 from mjchair.diagnosis.explain.column_ids import Driver, Quantity
-from mjchair.diagnosis.next_experiment.design import PLENTY, Evidence, Plan
+from mjchair.diagnosis.next_experiment.design import ENOUGH, PLENTY, Evidence, Plan
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.model.wheels import base_name
 from mjchair.simulation.channels import channels
 
-ENOUGH = 3.0  # sigmas that decide
 CLOSE = 0.7  # of the best T, that is worth a word
 OFTEN = 20  # repetitions beyond which nobody would
 NEARLY = 0.8  # of the strongest driver's sigmas
@@ -30,9 +29,9 @@ def deciding(plan: Plan, simulator: WindowSimulator) -> str:
     pairs = zip(plan.chosen, plan.rivals, best.separations, plan.evidence, strict=True)
     for chosen, rival, t, evidence in pairs:
         said.append(f"It separates {plain(chosen)} from {plain(rival)} by {_sigmas(t)}.")
-        if evidence.noises > 1.0:
+        if evidence is not None and evidence.noises > 1.0:
             said.append(_evidence(evidence, chosen, rival, units[evidence.channel]))
-    said += _again(best.least)
+    said += _again(plan)
     near = max(CLOSE * min(best.least, PLENTY), 1.0)
     others = [e for e in plan.experiments[1:2] if e.least > near]
     said += [f"Or {_lower(e.manoeuvre.words)} ({_sigmas(e.least)})." for e in others]
@@ -77,17 +76,21 @@ def _evidence(evidence: Evidence, chosen: str, rival: str, unit: str) -> str:
     )
 
 
-def _again(least: float) -> list[str]:
+def _again(plan: Plan) -> list[str]:
     """What to do where one run does not decide."""
-    if least >= ENOUGH**2:
+    needed = plan.needed or (ENOUGH,) * len(plan.rivals)
+    pairs = zip(needed, plan.best.separations, strict=True)
+    least, t = max(pairs, key=lambda pair: pair[0] / max(pair[1], 1e-9))
+    if t >= least:
         return []
-    times = math.ceil(ENOUGH**2 / max(least, 1e-9))
+    times = math.ceil(least / max(t, 1e-9))
     if times > OFTEN:
         return [
             f"No manoeuvre of the library decides: this one, the best, would need more than "
             f"{OFTEN} repetitions. Better sensors or another kind of run are needed."
         ]
-    return [f"One such run is below {ENOUGH:g} sigmas: repeat it {times} times."]
+    return [f"One such run is below the {math.sqrt(least):.2g} sigmas that decide: repeat it "
+            f"{times} times."]  # fmt: skip
 
 
 def _lower(words: str) -> str:
