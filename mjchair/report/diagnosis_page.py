@@ -301,7 +301,8 @@ def _experiments_note(diagnosis: Diagnosis) -> str:
     return (
         f"{shown} of {len(plan.experiments)} manoeuvres, best first, and simplest first where "
         "they decide with a margin, simulated with the corrected chair: how far each explanation "
-        "would fall behind after everything that is only roughly known, and its own parameters, have been fitted."
+        "would fall behind after everything that is only roughly known, and its own parameters, "
+        "have been fitted."
     )
 
 
