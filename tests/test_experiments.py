@@ -12,11 +12,13 @@ from mjchair.diagnosis import diagnose
 from mjchair.diagnosis.data.study import make_study
 from mjchair.diagnosis.explain.candidates import Around, collect
 from mjchair.diagnosis.explain.column_ids import Driver, Quantity
+from mjchair.diagnosis.fit import process
 from mjchair.diagnosis.fit.nonlinear import refit
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.next_experiment import design, wording
 from mjchair.diagnosis.next_experiment.design import Evidence, Experiment, Plan
 from mjchair.diagnosis.next_experiment.manoeuvres import LIBRARY, Setting, possible, setting
+from mjchair.diagnosis.replay.pulses import pulse_answers, pulses
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.diagnosis.replay.window_states import track
 from mjchair.effects.effect import Effect, Parameter
@@ -190,6 +192,17 @@ def test_longer_runs_and_less_noise_separate_more(one_way):
     finer = {c: replace(n, white=0.5 * n.white, slow=0.5 * n.slow) for c, n in bench.noise.items()}
     for quiet, before in zip(separations(replace(bench, noise=finer)), loud, strict=True):
         assert before < quiet <= 4.0 * before * (1.0 + 1e-9)
+
+
+def test_a_chair_that_is_shaken_promises_less(one_way, against_slope):
+    _, _, bench, (rolling, slope, _) = one_way
+    asked = pulses(bench.simulator)
+    answers = pulse_answers(bench.simulator, rolling.track, asked)
+    shaken = replace(bench, process=process.first(bench.simulator, rolling.track, asked, answers))
+    few = [BY_NAME["coast reversed"]]
+    found = design.plan(shaken, rolling, [slope], few, doubts=())
+    quiet = next(e for e in against_slope.experiments if e.manoeuvre.name == few[0].name)
+    assert 0.5 < found.best.least < 0.5 * quiet.least
 
 
 def test_a_lab_without_torque_gets_none():

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -14,14 +15,17 @@ from numpy.typing import NDArray
 
 from mjchair.diagnosis.data.study import Run, Study
 from mjchair.diagnosis.data.windows import Window
+from mjchair.diagnosis.fit import process
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import RoughlyKnown
 from mjchair.diagnosis.fit.nonlinear import Fitted, moved
+from mjchair.diagnosis.fit.process import Process
 from mjchair.diagnosis.fit.variant import Variant
 from mjchair.diagnosis.fit.whitening import Whitener
 from mjchair.diagnosis.next_experiment.manoeuvres import Manoeuvre, Setting
 from mjchair.diagnosis.replay.chair_state import SLOW, STEPS, State
 from mjchair.diagnosis.replay.derivatives import Column
+from mjchair.diagnosis.replay.pulses import Force, Pulse, pulse_answers, pulses
 from mjchair.diagnosis.replay.sensor_errors import SensorErrors
 from mjchair.diagnosis.replay.simulator import Job, WindowSimulator
 from mjchair.diagnosis.replay.window_states import Track
@@ -31,6 +35,7 @@ from mjchair.measurement.trial import Trial
 from mjchair.simulation.initial import start
 
 Array = NDArray[np.float64]
+DISTURBING = (Force.FORWARD, Force.LEFTWARD, Force.YAW)
 TIPPED = 0.8  # of the chair's up axis along the vertical: less is a chair that falls
 FASTEST = 10.0  # m/s, beyond which it is no chair
 # a chair that coasts backwards is not stable: what begins with 0.02 rad/s more may end elsewhere,
@@ -90,7 +95,8 @@ class Rehearsal:
     Attributes:
       manoeuvres: that the chair comes through and would repeat. first: their states at the start.
       simulator: of their windows, coarse models only. whitener: of the noise that the study has.
-      track: of the chair, from its own states.
+      chair: that makes them. track: of it, from its own states.
+      process: what shakes the chair, as strong as in the study; None: nothing.
     """
 
     def __init__(
@@ -98,6 +104,7 @@ class Rehearsal:
     ) -> None:
         """Simulate the manoeuvres."""
         self.manoeuvres = list(manoeuvres)
+        self.chair = chair
         self.known: dict[object, mujoco.MjModel] = {}
         self._plan(bench, setting)
         self.first = self._starts(chair)
@@ -111,6 +118,7 @@ class Rehearsal:
             traces = [traces[i] for i in whole]
         self.whitener = Whitener(self.simulator, bench.noise)
         self.track = self._track(chair, traces)
+        self.process = None if bench.process is None else self._shaken(bench, bench.process)
 
     def _plan(self, bench: Bench, setting: Setting) -> None:
         source = bench.simulator.study
@@ -184,17 +192,31 @@ class Rehearsal:
             for step in STEPS[:, None] * np.eye(len(SLOW))
         ]
         slow = [np.stack([a[i] - y for a in aside], axis=2) for i, y in enumerate(predicted)]
-        return Track(states, predicted, slow, [])
+        model = simulator.compile(chair.variant.edit)
+        jobs = [Job(model, *pair) for pair in zip(simulator.windows, states, strict=True)]
+        trace = [outcome.trace for outcome in simulator.run(jobs, trace=True)]
+        return Track(states, predicted, slow, trace)
 
     def predict(self, chairs: Sequence[Version]) -> list[Column]:
         """What each chair's channels show of every window, from the states of the track."""
         return self._predict(chairs, self.track.states)
 
-    def traces(self, chair: Version) -> list[dict[str, Array]]:
-        """States of the chair along every window, from the states of the track."""
-        model = self.simulator.compile(chair.variant.edit)
-        pairs = zip(self.simulator.windows, self.track.states, strict=True)
-        return [o.trace for o in self.simulator.run([Job(model, *p) for p in pairs], trace=True)]
+    @cached_property
+    def disturbed(self) -> tuple[list[Pulse], list[Array]]:
+        """Pulses of the forces that disturb the chair, in every window, and their answers."""
+        asked = [p for p in pulses(self.simulator) if p.force in DISTURBING]
+        return asked, pulse_answers(self.simulator, self.track, asked, self.chair.variant.edit)
+
+    def _shaken(self, bench: Bench, known: Process) -> Process:
+        """The process of the study, at the mean level of the runs that were fitted to."""
+        fitted = list(bench.simulator.study.fitted)
+        runs = len(self.simulator.study.runs)
+        levels = {
+            part: np.full(runs, np.sqrt(np.mean(np.square(level[fitted]))))
+            for part, level in known.levels.items()
+        }
+        made = process.first(self.simulator, self.track, *self.disturbed)
+        return replace(made, levels=levels, wobbles=known.wobbles)
 
     def _predict(self, chairs: Sequence[Version], states: Sequence[State]) -> list[Column]:
         simulator = self.simulator

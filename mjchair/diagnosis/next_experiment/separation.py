@@ -22,18 +22,18 @@ from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ColumnId, RoughlyKnown
 from mjchair.diagnosis.fit.elimination import eliminate_window
 from mjchair.diagnosis.fit.nonlinear import Fitted
+from mjchair.diagnosis.fit.process import SLOW
 from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.fit.variant import Term, Variant, nudged
 from mjchair.diagnosis.next_experiment.rehearsal import Rehearsal, version
 from mjchair.diagnosis.replay.derivatives import Column, Point, differences
-from mjchair.diagnosis.replay.pulses import Force, Pulse, pulse_answers
+from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.replay.sampling import residual
 from mjchair.effects.effect import Effect, SensorError
 from mjchair.effects.effect import step as typical_step
 from mjchair.errors import MjchairError
 
 Array = NDArray[np.float64]
-APART = 0.5  # s, between peaks of a force of any course
 PHASE = math.pi / math.sqrt(3.0)  # rad, standard deviation of a phase that starts anew each run
 
 
@@ -121,7 +121,13 @@ def _add(
         nothing = np.zeros_like(miss)
         known = [columns[n][i] if n in columns else nothing for n in system.columns]
         window = eliminate_window(
-            simulator, rehearsal.track, rehearsal.whitener, i, miss, np.stack(known, axis=2)
+            simulator,
+            rehearsal.track,
+            rehearsal.whitener,
+            i,
+            miss,
+            np.stack(known, axis=2),
+            rehearsal.process,
         )
         G[w.run] += window.G
         b[w.run] += window.b
@@ -219,25 +225,24 @@ def doubt_column(bench: Bench, chosen: Fitted, effect: Effect) -> Column:
 def outside_answers(
     rehearsal: Rehearsal, chosen: Fitted, force: Force
 ) -> tuple[dict[ColumnId, Column], dict[ColumnId, Column]]:
-    """Columns of a force of any course, in the manoeuvres and in the present data, where it is nil.
+    """Columns of a slow force of any course, in the manoeuvres and in the present data.
 
-    The present data hold nothing of what it does in another run, so that it is free there, with the
-    size that a force outside the library has beforehand.
+    The present data hold nothing of what it does in another run: their columns are zero, and in the
+    manoeuvres it has the size that a force outside the library has beforehand.
     """
-    simulator, chair = rehearsal.simulator, version(chosen)
-    asked, names = [], []
-    for i, w in enumerate(simulator.windows):
-        count = max(2, round((w.last - w.first) / APART) + 1)
-        times = np.linspace(w.first, w.last, count)
-        asked += [Pulse(force, i, float(t), float(times[1] - times[0])) for t in times]
-        names += [RoughlyKnown(f"outside:{force}:{w.index}:{k}") for k in range(count)]
-    track = replace(rehearsal.track, trace=rehearsal.traces(chair))
-    found = pulse_answers(simulator, track, asked, chair.variant.edit)
-    answers: dict[ColumnId, Column] = {
-        name: [np.zeros_like(y) for y in track.predicted] for name in names
-    }
-    for name, pulse, answer in zip(names, asked, found, strict=True):
-        answers[name][pulse.window] = SPREAD[force] * answer
+    pulses, shown = rehearsal.disturbed
+    answers: dict[ColumnId, Column] = {}
+    for i, w in enumerate(rehearsal.simulator.windows):
+        which = [k for k, p in enumerate(pulses) if p.window == i and p.force == force]
+        time = np.array([pulses[k].time for k in which])
+        alike = np.exp(-np.abs(time[:, None] - time[None, :]) / SLOW)
+        root = SPREAD[force] * np.linalg.cholesky(alike)
+        courses = np.stack([shown[k] for k in which], axis=2) @ root
+        for nth in range(len(which)):
+            name = RoughlyKnown(f"outside:{w.index}:{nth}")
+            if name not in answers:
+                answers[name] = [np.zeros_like(y) for y in rehearsal.track.predicted]
+            answers[name][i] = courses[:, :, nth]
     nothing = [np.zeros_like(y) for y in chosen.track.predicted]
     return answers, dict.fromkeys(answers, nothing)
 
