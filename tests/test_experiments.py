@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 from noisy_run import NOISE, noisy_run
@@ -18,6 +19,7 @@ from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.next_experiment import design, wording
 from mjchair.diagnosis.next_experiment.design import Evidence, Experiment, Plan
 from mjchair.diagnosis.next_experiment.manoeuvres import LIBRARY, Setting, possible, setting
+from mjchair.diagnosis.next_experiment.rehearsal import Rehearsal, Version
 from mjchair.diagnosis.replay.pulses import pulse_answers, pulses
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.diagnosis.replay.window_states import track
@@ -25,7 +27,7 @@ from mjchair.effects.effect import Effect, Parameter
 from mjchair.effects.library import find
 from mjchair.errors import MjchairError
 from mjchair.model import inertials
-from mjchair.simulation.initial import Initial
+from mjchair.simulation.initial import Initial, start
 
 TRUTH = {"coefficient": 0.002}
 ONE_WAY = (Initial((0.0, 0.0), 0.3, 1.5), Initial((0.0, 0.5), 0.3, 1.2))
@@ -192,6 +194,24 @@ def test_longer_runs_and_less_noise_separate_more(one_way):
     finer = {c: replace(n, white=0.5 * n.white, slow=0.5 * n.slow) for c, n in bench.noise.items()}
     for quiet, before in zip(separations(replace(bench, noise=finer)), loud, strict=True):
         assert before < quiet <= 4.0 * before * (1.0 + 1e-9)
+
+
+def test_a_rehearsed_spin_ends_like_one_of_smaller_steps(one_way):
+    bench = one_way[2]
+    spin, here = BY_NAME["free spin"], setting(bench.simulator.study)
+    heavier = Term(find("payload"), {"mass": 43.0, "height": 1.2}, ())
+    variant = Variant(bench.nuisances, {}, (heavier,))
+    chair = Version(variant)
+    made = Rehearsal(bench, here, [spin], chair)
+    casters = made.simulator.chair.swivel_q
+    model = made.simulator.compile(variant.edit)
+    model.opt.timestep = 0.001
+    with mjchair.installed():
+        data = start(model, here.initial(spin))
+        for _ in range(6000):
+            mujoco.mj_step(model, data)
+    (trace,) = made._open_loop(chair, made.first)
+    assert trace["qpos"][-1][casters] == pytest.approx(data.qpos[casters], abs=0.03)
 
 
 def test_a_chair_that_is_shaken_promises_less(one_way, against_slope):

@@ -94,7 +94,7 @@ class Rehearsal:
 
     Attributes:
       manoeuvres: that the chair comes through and would repeat. first: their states at the start.
-      simulator: of their windows, coarse models only. whitener: of the noise that the study has.
+      simulator: of their windows. whitener: of the noise that the study has.
       chair: that makes them. track: of it, from its own states.
       process: what shakes the chair, as strong as in the study; None: nothing.
     """
@@ -133,9 +133,9 @@ class Rehearsal:
         self.longer = WindowSimulator(study, windows)
 
     def model(self, chair: Version) -> mujoco.MjModel:
-        """The chair's coarse model."""
+        """The chair's model, at the fine step: at the coarse one casters drift after a spin."""
         if chair.mechanics not in self.known:
-            self.known[chair.mechanics] = self.simulator.compile(chair.variant.edit, coarse=True)
+            self.known[chair.mechanics] = self.simulator.compile(chair.variant.edit)
         return self.known[chair.mechanics]
 
     def _starts(self, chair: Version) -> list[State]:
