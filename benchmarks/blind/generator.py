@@ -158,6 +158,11 @@ class World:
             m.body_inertia[c] *= 1.0 + by
         elif name.startswith("ipos"):
             m.body_ipos[c, int(name[-1])] += by
+        elif name == "wheel_inertia":
+            for wheel in WHEELS[:2]:
+                m.body_inertia[m.body(wheel).id] *= 1.0 + by
+        elif name == "radius":
+            self._edit_wheel_radius(by, by)
         else:
             self._stiffen(WHEELS[:2] if name == "rear" else WHEELS[2:], 1.0 + by)
         mujoco.mj_setConst(m, mujoco.MjData(m))
@@ -530,6 +535,13 @@ ROUGHLY = {  # what a study knows only roughly: standard deviations, as the docu
     "ipos.2": 0.03,
     "rear": 0.07,
     "casters": 0.07,
+    "wheel_inertia": 0.05,
+    "radius": 0.0015,
+    **{
+        f"gain.{name}": 0.01
+        for name in NOISE
+        if name.endswith("wheel_speed") or name.startswith("imu_")
+    },
     "bias.imu_gyro.z": 0.003,
     "bias.imu_accelerometer.x": 0.05,
     "bias.imu_accelerometer.y": 0.05,
@@ -537,20 +549,22 @@ ROUGHLY = {  # what a study knows only roughly: standard deviations, as the docu
 
 
 @lru_cache
-def roughly(trial: int, seconds: float) -> np.ndarray:
+def roughly(trial: int, seconds: float, afresh: bool = True) -> np.ndarray:
     """Change of a run by one standard deviation of each roughly known number, (n, numbers)."""
     man = MANOEUVRES[trial]
     plain = run(World(None, {}), man, seconds)[0]
     columns = []
     for name, std in ROUGHLY.items():
-        if name.startswith("bias."):
-            channel = name.removeprefix("bias.")
+        kind, _, channel = name.partition(".")
+        if kind == "bias":
             moved = dict(plain, **{channel: plain[channel] + std})
+        elif kind == "gain":
+            moved = dict(plain, **{channel: plain[channel] * (1.0 + std)})
         else:
             world = World(None, {})
             world.change(name, std)
             moved = run(world, man, seconds)[0]
-        columns.append(apart([moved], [plain]))
+        columns.append(apart([moved], [plain], afresh))
     return np.column_stack(columns)
 
 
@@ -569,8 +583,10 @@ def _size(case: Case, seed: int, trials: tuple[int, ...], seconds: float) -> Non
     chosen = [MANOEUVRES[k] for k in trials]
     plain = World(np.random.default_rng([seed, 2]), {})
     without = [run(plain, man, seconds)[0] for man in chosen]
-    known = np.vstack([roughly(k, seconds) for k in trials])
     for name in case.hidden:
+        # a new initial position or speed of one channel alone is not a possible motion
+        moves = not name.startswith("sensor")
+        known = np.vstack([roughly(k, seconds, moves) for k in trials])
         first, size = dict(case.hidden[name]), 1.0
         low, high = 0.0, np.inf
         for _ in range(6):
@@ -581,8 +597,6 @@ def _size(case: Case, seed: int, trials: tuple[int, ...], seconds: float) -> Non
             else:
                 world = World(np.random.default_rng([seed, 2]), {name: case.hidden[name]})
                 exact = [run(world, man, seconds)[0] for man in chosen]
-            # a new initial position or speed of one channel alone is not a possible motion
-            moves = not name.startswith("sensor")
             case.reached[name] = detectability(apart(exact, without, moves), known)
             factor = case.sigma / max(case.reached[name], 1e-6)
             if 0.8 < factor < 1.25 or scaled(first, name, 1.2 * size) == case.hidden[name]:
