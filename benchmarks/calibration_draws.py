@@ -327,7 +327,7 @@ def _noise(bed: Bed, rng: np.random.Generator) -> list[Array]:
 class LinearSearch(search.Search):
     """The diagnosis' search, whose fits are those of the linear system."""
 
-    def _from(self, hypothesis: Hypothesis, share: float) -> Any:
+    def _from(self, hypothesis: Hypothesis, share: float, best: Any) -> Any:
         if share < 1.0:
             return None
         return _fit(self.base, hypothesis)

@@ -33,7 +33,7 @@ from mjchair.simulation.simulate import simulate
 SEAL = "answer.sealed"
 HELD_OUT = "push"  # no fit sees it; what is left turns in two ways and rolls in three
 RATE, SECONDS = 100.0, 6.0  # Hz, s
-LOAD = Load(mass=20.0, height=0.55)  # on the seat
+LOAD = Load(mass=40.0, height=0.55)  # on the seat
 TURNS_OVER = 4.0  # s, until which a chair that rolled backward is driven forward
 NOISE = {  # SI; sizes of encoders, a small IMU and motion capture; assumed
     "left_wheel_speed": 0.05,

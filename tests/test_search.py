@@ -130,3 +130,13 @@ def test_an_effect_that_brings_nothing_once_all_is_made_anew_is_dropped(fits, mo
     looking = searching()
     chosen = looking.without_needless(looking.fit(BOTH))
     assert chosen.hypothesis.keys == ("rolling",)
+
+
+def test_a_fit_that_cannot_come_near_the_best_is_not_started_again(fits):
+    """It promises 1450 beside a best of 1000, of a gain of 1000 where 2 % keep a rival."""
+    fits.answers[("motor", "as given")] = fit(1500.0, "motor", promised=1450.0)
+    fits.answers[("motor", "track of motor")] = fit(1440.0, "motor")
+    rival = Hypothesis((MOTOR,), gain=560.0, score=550.0)
+    best = search.Tried(ONE, fit(1000.0, "rolling"))
+    assert searching().fit(rival, best).fitted.total == 1500.0
+    assert searching().fit(rival).fitted.total == 1440.0

@@ -26,6 +26,7 @@ SIGMAS = 4.0  # standard errors of a parameter away from neutral
 # what keeps a rival
 RIVAL_CHI2 = 10.0  # a rival this near, in chi2 with its penalty, is not ruled out
 FORM = 0.02  # of the gain: the form of no effect is better known (assumption)
+FAR_BEHIND = 3.0  # times what keeps a rival: a fit that promises no more is not started again
 RIVAL_ERRORS = 2.0  # nor one this near in paired standard errors over windows
 # how hypotheses grow and shrink
 MOST = 3  # effects that are added
@@ -279,6 +280,15 @@ def is_stuck(*, total: float, promised: float) -> bool:
     Then the columns of what is only roughly known, which are made once, are too old.
     """
     return total - promised > RIVAL_CHI2
+
+
+def out_of_reach(*, promised: float, best: float, gain: float) -> bool:
+    """Whether a fit is not worth starting again: even what it promises is far behind.
+
+    Args:
+      promised, best: chi2 that the fit promises, and of the best fit. gain: that the best brings.
+    """
+    return promised - best > FAR_BEHIND * max(RIVAL_CHI2, FORM * gain)
 
 
 def stays_a_rival(*, behind: float, gain: float, errors: float, beyond_bound: bool) -> bool:

@@ -28,7 +28,8 @@ from mjchair.errors import MjchairError
 
 TRIED = 3  # hypotheses of one size, where the first leaves a gap
 LISTED = 6  # hypotheses of one size, until one can be
-REFITTED = 5  # rivals of one effect
+REFITTED = 5  # rivals of an effect that is alone
+BESIDE = 3  # rivals of each effect that has others beside it
 SHARES = (0.875, 0.75, 0.625, 0.5, 0.375, 0.25, 0.125)  # of linear coefficients, for a new start
 SWAPS = 2  # times that a rival takes the place of the chosen hypothesis
 
@@ -122,7 +123,7 @@ class Search:
         ]
         tried = top
         for other in near[: TRIED - 1]:
-            more = self.believed(other)
+            more = self.believed(other, top)
             if more is not None and (top is None or more.price < top.price):
                 top = more
         if top is None:  # a favourite of linear algebra that cannot be says nothing of the others
@@ -132,9 +133,9 @@ class Search:
             return None
         return top, left if top is tried else gap_after(self.base, top.fitted)
 
-    def believed(self, hypothesis: Hypothesis) -> Tried | None:
+    def believed(self, hypothesis: Hypothesis, best: Tried | None = None) -> Tried | None:
         """The fit, where every parameter is off its bounds and known better than beforehand."""
-        tried = self.fit(hypothesis)
+        tried = self.fit(hypothesis, best)
         if tried is None or _believable(tried.fitted):
             return tried
         self._note(
@@ -198,11 +199,12 @@ class Search:
     def rivals(self, chosen: Tried) -> list[list[Rival]]:
         """For every effect of the choice: what could stand in its place, best first."""
         hypothesis = chosen.hypothesis
+        most = REFITTED if len(hypothesis.starts) == 1 else BESIDE
         out = []
         for start in hypothesis.starts:
             others = tuple(s for s in hypothesis.starts if s is not start)
             near = [h for h in _replacements(self.base, start, others) if _close(hypothesis, h)]
-            tried = [self.fit(h) for h in near[:REFITTED]]
+            tried = [self.fit(h, chosen) for h in near[:most]]
             out.append(
                 [
                     Rival(t.hypothesis, t.fitted)
@@ -212,8 +214,11 @@ class Search:
             )
         return out
 
-    def fit(self, hypothesis: Hypothesis) -> Tried | None:
+    def fit(self, hypothesis: Hypothesis, best: Tried | None = None) -> Tried | None:
         """The nonlinear fit; from a second start where the first misses what was promised.
+
+        Args:
+          best: so far; a fit that cannot come near it is not started again.
 
         Returns:
           None where this chair cannot have these effects; that is noted.
@@ -224,27 +229,28 @@ class Search:
         if hypothesis.starts in self.impossible:
             return None
         self.say("fit of " + " and ".join(hypothesis.keys))
-        fitted = self._beside_part(hypothesis, self._best_start(hypothesis))
+        fitted = self._beside_part(hypothesis, self._best_start(hypothesis, best))
         if fitted is None:
             self.impossible.append(hypothesis.starts)
             return None
         self.tried.append(Tried(hypothesis, fitted))
         return Tried(hypothesis, fitted)
 
-    def _best_start(self, hypothesis: Hypothesis) -> Fitted | None:
+    def _best_start(self, hypothesis: Hypothesis, best: Tried | None) -> Fitted | None:
         """The better of two starts; of one, where it gets to what was promised.
 
         The second is the best place on the line from no effect to what linear algebra promises: a
         tire with a quarter of its friction slides where one with a third of it does not.
         """
-        first = self._from(hypothesis, 1.0)
+        first = self._from(hypothesis, 1.0, best)
         promised = self.base.reduced.total - hypothesis.gain
-        if first is not None and not rules.fell_short(
-            total=first.total, promised=promised, gain=hypothesis.gain
+        if first is not None and (
+            self._is_behind(first, best)
+            or not rules.fell_short(total=first.total, promised=promised, gain=hypothesis.gain)
         ):
             return first
         share = self._best_share(hypothesis)
-        second = None if share is None else self._from(hypothesis, share)
+        second = None if share is None else self._from(hypothesis, share, best)
         fits = [f for f in (first, second) if f is not None]
         if len(fits) > 1 and rules.starts_disagree(fits[0].total, fits[1].total):
             ends = " and ".join(f"{f.total:.0f}" for f in fits)
@@ -296,7 +302,15 @@ class Search:
         if line not in self.dropped:
             self.dropped.append(line)
 
-    def _from(self, hypothesis: Hypothesis, share: float) -> Fitted | None:
+    def _is_behind(self, fitted: Fitted, best: Tried | None) -> bool:
+        """Whether a fit ends, by its own promise, too far behind the best to come near it."""
+        return best is not None and rules.out_of_reach(
+            promised=fitted.promised,
+            best=best.fitted.total,
+            gain=self.base.plain.total - best.fitted.total,
+        )
+
+    def _from(self, hypothesis: Hypothesis, share: float, best: Tried | None) -> Fitted | None:
         """The fit that begins at a share of the linear fit's coefficients."""
         try:
             fitted = self._refit(hypothesis, share)
@@ -304,7 +318,9 @@ class Search:
             self._note(f"{' and '.join(hypothesis.keys)} was not tried further: {error}")
             return None
         walled = any(abs(by) >= bounded.WALL for by in fitted.variant.offsets.values())
-        if walled:
+        if self._is_behind(fitted, best):
+            pass  # what it would gain if all were made anew decides nothing
+        elif walled:
             fitted = self._around_terms(fitted)
         elif rules.is_stuck(total=fitted.total, promised=fitted.promised):
             fitted = self._made_anew(fitted.variant, fitted.track) or fitted
