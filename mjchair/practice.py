@@ -92,11 +92,11 @@ def manoeuvres() -> list[Manoeuvre]:
     strokes = push_strokes({"left_wheel": 12.0, "right_wheel": 12.0}, SECONDS)
     there, back = ({"heading": h, "position": (x, 0.0)} for h, x in ((0.0, 0.0), (np.pi, 6.0)))
     return [
-        Manoeuvre("coast", {"speed": 2.8, **there}),
+        Manoeuvre("coast", {"speed": 3.4, **there}),
         Manoeuvre("coast", {"speed": 1.4, **back}, load=LOAD),
         Manoeuvre("turn", {"speed": 1.0, "heading": 0.5, "yaw_rate": 0.6}, _turn()),
         Manoeuvre("push", {"speed": 0.8, "heading": 1.2}, strokes),
-        Manoeuvre("slalom", {"speed": 1.0, "heading": -0.6}, _slalom()),
+        Manoeuvre("slalom", {"speed": 1.0, "heading": -0.6}, _slalom(), LOAD),
         Manoeuvre("reverse", {"speed": -0.5, "heading": 2.2, "yaw_rate": 0.2}, _reverse()),
         Manoeuvre("spin", {"heading": -1.5}, _spin()),
     ]

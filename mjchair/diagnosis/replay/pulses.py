@@ -92,6 +92,7 @@ def pulse_answers(
     """What each pulse of one newton or newton metre changes in its own window, (rows, channels)."""
     out = []
     model = simulator.compile(base_edit, coarse=True)
+    chair = Chair(model)  # an effect may add joints before the wheels'
     with installed():
         reference = predictions(simulator, track, model, SensorErrors(simulator.channels))
         for at in range(0, len(asked), AT_ONCE):
@@ -101,7 +102,7 @@ def pulse_answers(
                     model,
                     simulator.windows[p.window],
                     track.states[p.window],
-                    _force(simulator, track, p, float(model.opt.timestep)),
+                    _force(simulator, track, p, model, chair),
                 )
                 for p in group
             ]
@@ -110,16 +111,18 @@ def pulse_answers(
     return out
 
 
-def _force(simulator: WindowSimulator, track: Track, pulse: Pulse, step: float) -> Array:
-    """Generalized force (steps, nv) of a pulse on a grid of simulation steps (s)."""
-    chair, w = simulator.chair, simulator.windows[pulse.window]
+def _force(
+    simulator: WindowSimulator, track: Track, pulse: Pulse, model: mujoco.MjModel, chair: Chair
+) -> Array:
+    """Generalized force (steps, nv) of a pulse on the grid of the model's steps."""
+    w, step = simulator.windows[pulse.window], float(model.opt.timestep)
     steps = int(np.ceil(simulator.steps * simulator.step / step)) + 1
     every = max(1, round(step / simulator.step))
     time = w.start + step * np.arange(steps)
     shape = np.clip(1.0 - np.abs(time - pulse.time) / pulse.width, 0.0, None)
     if pulse.time - pulse.width < w.first:  # the first pulse acts from the start of the lead
         shape[time < pulse.time] = 1.0
-    force = np.zeros((steps, simulator.base.nv))
+    force = np.zeros((steps, model.nv))
     size = KINDS[pulse.force].size * shape
     if pulse.force in WHEELS:
         force[:, chair.rear[WHEELS.index(pulse.force)].dof] = size
