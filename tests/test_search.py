@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from mjchair.diagnosis.explain import search
@@ -140,3 +141,25 @@ def test_a_fit_that_cannot_come_near_the_best_is_not_started_again(fits):
     best = search.Tried(ONE, fit(1000.0, "rolling"))
     assert searching().fit(rival, best).fitted.total == 1500.0
     assert searching().fit(rival).fitted.total == 1440.0
+
+
+@pytest.mark.parametrize(
+    ("worse", "stays"),
+    [
+        ([30.0] * 12, False),
+        ([5000.0, *[30.0] * 12], False),  # one window hides what the others say
+        ([5000.0, *[1.0, -1.0] * 6], True),  # one window alone decides nothing
+        ([2.0] * 12, True),
+    ],
+)
+def test_one_window_neither_rules_a_rival_out_nor_keeps_it(worse, stays):
+    scatter = np.resize([4.0, -4.0], len(worse))
+    ours = np.full(len(worse), 100.0)
+    total = ours.sum()
+    chosen = search.Tried(ONE, SimpleNamespace(total=total, chi2=ours, at_bound=()))
+    theirs = ours + np.array(worse) + scatter
+    rival = search.Tried(
+        Hypothesis((MOTOR,), 400.0, 390.0),
+        SimpleNamespace(total=theirs.sum(), chi2=theirs, at_bound=()),
+    )
+    assert search._not_ruled_out(rival, chosen, total + 2000.0) == stays

@@ -20,6 +20,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import mjchair
 from mjchair.diagnosis.result import Diagnosis
 
+KEPT = ("verdict", "effects", "alternatives", "gap", "notes", "probability", "more_missing",
+        "material", "process")  # fmt: skip
 SCREENED = ("name", "channel", "detectability", "collinear", "held_out_gain")
 
 
@@ -33,7 +35,7 @@ def diagnosed(study: Path, threads: int) -> tuple[Diagnosis | None, dict]:
     except Exception:
         said = {"verdict": "error", "effects": [], "alternatives": [], "candidates": [],
                 "gap": {}, "notes": [traceback.format_exc()]}  # fmt: skip
-    kept = {k: said[k] for k in ("verdict", "effects", "alternatives", "gap", "notes")}
+    kept = {k: said.get(k) for k in KEPT}
     kept["candidates"] = [{k: c.get(k) for k in SCREENED} for c in said["candidates"]]
     return found, {"seconds": time.perf_counter() - began, **kept}
 

@@ -95,6 +95,44 @@ def _closed(lines: Sequence[dict]) -> str:
     return f"{1.0 - after / before:.0%}" if before > 0.0 else "no case"
 
 
+def hypothesis(line: dict) -> frozenset[str]:
+    """What was hidden, as the keys of a hypothesis."""
+    answer = line["answer"]
+    if not answer["hidden"] or answer["kind"] == "outside":
+        return frozenset([answer["kind"]])
+    channel = answer["channel"]
+    return frozenset(f"{n}:{channel}" if channel else n for n in answer["hidden"])
+
+
+def probable(line: dict) -> dict[frozenset[str], float]:
+    """Probability of every hypothesis, the most probable first."""
+    known = {frozenset(n.split("+")): p for n, p in (line.get("probability") or {}).items()}
+    return dict(sorted(known.items(), key=lambda item: -item[1]))
+
+
+def calibration_error(lines: Sequence[dict]) -> float:
+    """Mean distance between what the most probable hypotheses say and how often they are right."""
+    first = [next(iter(probable(x).items())) for x in lines]
+    said = np.array([p for _, p in first])
+    hit = np.array([h == hypothesis(x) for (h, _), x in zip(first, lines, strict=True)], float)
+    bins = np.minimum((said * 10).astype(int), 9)
+    return float(
+        sum(abs((hit - said)[bins == b].sum()) for b in np.unique(bins)) / max(len(lines), 1)
+    )
+
+
+def in_95_set(line: dict) -> bool:
+    """Whether what was hidden is among the most probable hypotheses that make up 95 %."""
+    whole = 0.0
+    for keys, p in probable(line).items():
+        if keys == hypothesis(line):
+            return True
+        whole += p
+        if whole >= 0.95:
+            break
+    return False
+
+
 def _kind(lines: Sequence[dict], kind: str, also: Callable[[dict], bool] = lambda _: True):  # type: ignore[no-untyped-def]
     return [x for x in lines if x["answer"]["kind"] == kind and also(x)]
 
@@ -108,6 +146,7 @@ def table(lines: Sequence[dict]) -> str:
     errors, covered = _errors([*one, *two])
     sizes = [len(returned(x)) for x in one if returned(x)]
     times = [x["seconds"] for x in lines]
+    told = [x for x in lines if x.get("probability")]
     rows = [
         ("false names where nothing is hidden", "at most 1 of 60", none, lambda x: bool(named(x))),
         (f"right name first, {SHOWS}, no rival alike", ">= 90 %", decided, right),
@@ -116,8 +155,10 @@ def table(lines: Sequence[dict]) -> str:
         ("a wrong name committed to, one effect", "none", one, wrong),
         ("below that: named, and right", "", faint, lambda x: bool(named(x)) and not wrong(x)),
         ("below that: named, and wrong", "", faint, wrong),
-        ("both of two effects named", ">= 75 %", two, lambda x: truth(x) <= named(x)),
+        ("both of two effects named", ">= 85 %", two, lambda x: truth(x) <= named(x)),
         ("both of two effects in the returned sets", "", two, kept),
+        ("nothing hidden: verdict `none`", ">= 95 %", none, lambda x: x["verdict"] == "none"),
+        ("what was hidden is in the 95 % set of hypotheses", "93-97 %", told, in_95_set),
         ("outside the library: no name", ">= 85 %", outside, lambda x: not named(x)),
         ("outside the library: seen, and no name", "", outside, lambda x: x["verdict"] in OPEN),
         ("crashes", "none", lines, lambda x: x["verdict"] == "error"),
@@ -128,6 +169,7 @@ def table(lines: Sequence[dict]) -> str:
         ("95 % interval covers", "88-98 %", f"{np.mean(covered or [0.0]):.0%} of {len(covered)}"),
         ("excess closed on the held-out trial, one effect", ">= 90 %", _closed(one)),
         ("excess closed on the held-out trial, two effects", ">= 80 %", _closed(two)),
+        ("expected calibration error", "<= 0.05", f"{calibration_error(told):.3f} of {len(told)}"),
         ("seconds a study on one core, median", "", f"{_median(times):.0f}"),
     ]
     return markdown(("figure", "aim", "result"), [*counted(rows), *measured])

@@ -406,12 +406,26 @@ def _freed(base: Base, hypothesis: Hypothesis, start: Start) -> Hypothesis:
 
 
 def _not_ruled_out(rival: Tried, chosen: Tried, plain: float) -> bool:
-    """Whether the data leave a rival standing; `plain` is the chi2 without effects."""
-    return rules.stays_a_rival(
-        behind=rival.price - chosen.price,
-        gain=plain - chosen.fitted.total,
-        errors=rules.paired_errors(rival.fitted.chi2, chosen.fitted.chi2),
-        beyond_bound=bool(rival.fitted.at_bound and not chosen.fitted.at_bound),
+    """Whether the data leave a rival standing; `plain` is the chi2 without effects.
+
+    It is also out where all windows but the one that tells most against it rule it out: that one
+    makes the scatter over windows so large that it hides what the others say.
+    """
+    theirs, ours = rival.fitted.chi2, chosen.fitted.chi2
+    behind = rival.price - chosen.price
+    most = int(np.argmax(theirs - ours))
+    cases = (
+        (behind, theirs, ours),
+        (behind - (theirs - ours)[most], np.delete(theirs, most), np.delete(ours, most)),
+    )
+    return all(
+        rules.stays_a_rival(
+            behind=by,
+            gain=plain - chosen.fitted.total,
+            errors=rules.paired_errors(other, own),
+            beyond_bound=bool(rival.fitted.at_bound and not chosen.fitted.at_bound),
+        )
+        for by, other, own in cases
     )
 
 
