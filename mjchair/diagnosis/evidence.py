@@ -191,7 +191,9 @@ def _whole_runs(base: Base, fitted: Fitted | None) -> tuple[WholeRun, ...]:
     whole = WindowSimulator(
         simulator.study, [_whole(simulator, i) for i in shown], threads=simulator.threads
     )
-    old = _rolled(whole, simulator, Variant(base.bench.nuisances), base.around.track)
+    # both begin alike: the old chair's own first state makes up for what it lacks in that window
+    begin = base.around.track if fitted is None else fitted.track
+    old = _rolled(whole, simulator, Variant(base.bench.nuisances), begin)
     new: list[Array] | None = None
     if fitted is not None:
         # a chair that no rest is found for has no picture; its windows have been simulated

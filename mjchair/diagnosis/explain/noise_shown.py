@@ -20,7 +20,7 @@ from mjchair.diagnosis.explain.column_ids import EffectColumn, EffectGroup, Forc
 from mjchair.diagnosis.fit import noise_levels, process
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ColumnId
-from mjchair.diagnosis.fit.noise_levels import Levels
+from mjchair.diagnosis.fit.noise_levels import FORCES, Levels
 from mjchair.diagnosis.fit.process import Process
 from mjchair.diagnosis.replay import derivatives
 from mjchair.diagnosis.replay.derivatives import Column
@@ -36,6 +36,7 @@ Array = NDArray[np.float64]
 SPREAD = {Force.FORWARD: 10.0, Force.YAW: 3.0}  # N, N m: prior of a force that goes with something
 SCALE = 0.1  # prior of a sensor's scale, 1
 SHAKES = 0.3  # of the chair's own rolling resistance: what shakes it harder has a cause
+HUSH = 0.05  # of a level: nearly nothing
 SIZES = 5.0  # sizes worth finding: prior of the best hypothesis
 
 
@@ -71,6 +72,24 @@ def with_noise_left_by(
     assert bench.process is not None
     broad = {key: [SIZES * window for window in column] for key, column in best.items()}
     return _estimated(bench, here, bench.process, {**nuisances, **broad})
+
+
+def loudness(bench: Bench) -> float:
+    """Power of what shakes the chair, over the most that is believed of it; its loudest force."""
+    assert bench.process is not None
+    most, levels = _most(bench.simulator), bench.process.levels
+    return max((process.force_level(levels, f) / most[f]) ** 2 for f in FORCES.values())
+
+
+def hushed(bench: Bench) -> Bench:
+    """The bench with nearly nothing that shakes the chair, but for what study.toml gives."""
+    assert bench.process is not None
+    given = noise_levels.known_parts(bench.simulator.study)
+    levels = {
+        part: level if part in given else HUSH * level
+        for part, level in bench.process.levels.items()
+    }
+    return replace(bench, process=replace(bench.process, levels=levels))
 
 
 def _estimated(

@@ -244,10 +244,11 @@ class Search:
         """
         first = self._from(hypothesis, 1.0, best)
         promised = self.base.reduced.total - hypothesis.gain
-        if first is not None and (
-            self._is_behind(first, best)
-            or not rules.fell_short(total=first.total, promised=promised, gain=hypothesis.gain)
-        ):
+        beside = len(hypothesis.starts) > 1 and best is not None  # one of many: one start is enough
+        short = first is None or rules.fell_short(
+            total=first.total, promised=promised, gain=hypothesis.gain
+        )
+        if first is not None and (beside or not short or self._is_behind(first, best)):
             return first
         share = self._best_share(hypothesis)
         second = None if share is None else self._from(hypothesis, share, best)
