@@ -60,7 +60,7 @@ def choose(base: Base, gap: Gap, say: Say) -> Choice | None:
             options.append(hypotheses.grown(base.reduced, base.starts, bases))
         if not options[size - 1] or options[size - 1][0].score <= 0.0:
             break
-        top = search.best_of(options[size - 1])
+        top = search.best_of(options[size - 1], patient=best is None)
         if top is None:
             continue
         if best is not None and not search.is_worth(best, top[0]):
@@ -104,10 +104,15 @@ class Search:
         self.impossible: list[tuple[Start, ...]] = []
         self.again: list[Rival] = []
 
-    def best_of(self, options: Sequence[Hypothesis]) -> tuple[Tried, Gap] | None:
+    def best_of(
+        self, options: Sequence[Hypothesis], patient: bool = True
+    ) -> tuple[Tried, Gap] | None:
         """The best hypothesis with its fit, and the gap that it leaves; None: none can be.
 
         Where the first leaves a gap, the linear order may be wrong, and the next are fitted too.
+
+        Args:
+          patient: whether, where none of these can be, the list is gone on along.
         """
         first = _commonest(self.base, options)
         top = self.believed(first)
@@ -126,7 +131,7 @@ class Search:
             more = self.believed(other, top)
             if more is not None and (top is None or more.price < top.price):
                 top = more
-        if top is None:  # a favourite of linear algebra that cannot be says nothing of the others
+        if top is None and patient:  # favourites that cannot be say nothing of the others
             fits = (self.believed(other) for other in options[:LISTED])
             top = next((fit for fit in fits if fit is not None), None)
         if top is None:
