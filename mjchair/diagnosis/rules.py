@@ -258,8 +258,11 @@ def alike(score: float, best: float) -> bool:
 
 
 def fell_short(*, total: float, promised: float, gain: float) -> bool:
-    """Whether a nonlinear fit misses so much of the linear promise that it starts again."""
-    return total - promised >= max(SHORT * gain, WORTH)
+    """Whether a nonlinear fit misses so much of the linear promise that it starts again.
+
+    What a small effect misses of its promise is not for its size: where it starts makes no odds.
+    """
+    return gain > WORTH / SHORT and total - promised >= SHORT * gain
 
 
 def worth_refitting(*, behind: float, gain: float, rival_gain: float) -> bool:
