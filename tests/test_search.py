@@ -163,3 +163,23 @@ def test_one_window_neither_rules_a_rival_out_nor_keeps_it(worse, stays):
         SimpleNamespace(total=theirs.sum(), chi2=theirs, at_bound=()),
     )
     assert search._not_ruled_out(rival, chosen, total + 2000.0) == stays
+
+
+def test_where_no_second_effect_stands_no_third_is_tried(fits, monkeypatch):
+    """The second effect is not determined."""
+    third = Hypothesis((ROLLING, MOTOR, effect("scrub")), gain=950.0, score=920.0)
+    fits.answers[("rolling", "as given")] = fit(1500.0, "rolling")
+    fits.answers[("rolling", "track of rolling")] = fit(1490.0, "rolling")
+    fits.answers[("motor+rolling", "as given")] = fit(1110.0, "rolling", "motor")
+    monkeypatch.setattr(search.hypotheses, "singles", lambda *_: [ONE])
+    monkeypatch.setattr(search.hypotheses, "pairs", lambda *_: [BOTH])
+    monkeypatch.setattr(search.hypotheses, "grown", lambda *_: [third])
+    monkeypatch.setattr(search, "gap_after", lambda *_: SimpleNamespace(exists=True))
+    monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
+    monkeypatch.setattr(search, "_believable", lambda f: len(f.variant.terms) == 1)
+    monkeypatch.setattr(search, "_replacements", lambda *_: [])
+    base = searching().base
+    base.starts = ()
+    chosen = search.choose(base, SimpleNamespace(exists=True), lambda line: None)
+    assert chosen.hypothesis is ONE
+    assert "motor+rolling+scrub" not in {keys for keys, _ in fits.asked}

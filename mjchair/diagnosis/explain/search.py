@@ -62,7 +62,9 @@ def choose(base: Base, gap: Gap, say: Say) -> Choice | None:
             break
         top = search.best_of(options[size - 1], patient=best is None)
         if top is None:
-            continue
+            if best is None:
+                continue
+            break  # no second effect stands beside it, so no third does
         if best is not None and not search.is_worth(best, top[0]):
             break
         best, left = top
