@@ -1,12 +1,14 @@
 """The rules of the verdict, one by one, on plain numbers: what each allows and what it stops."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.rules import HeldOut, Standing, Verdict
+from mjchair.report.diagnosis_words import nothing_missing
 
 # an effect that closes all, is sure, and has no rival
 CLEAR = Standing(
@@ -179,6 +181,11 @@ def test_what_an_answer_leaves_is_said():
         # that something is there is certain, though not which of a set
         ({"said": Verdict.AMBIGUOUS, "sigmas": rules.CERTAIN + 0.1}, True),
         ({"said": Verdict.UNKNOWN, "sigmas": rules.CERTAIN + 0.1}, False),
+        # what nothing explains and does not make the residual larger than noise
+        ({"force": 4.0, "excess": 1.9}, False),
+        ({"force": 4.0, "excess": 1.9, "gap": rules.SMALL_GAP}, True),
+        ({"force": 4.0, "excess": 1.9, "told": True}, True),
+        ({"force": 4.0, "excess": 1.9, "said": Verdict.NAMED}, True),
     ],
 )
 def test_what_is_below_the_limit_does_not_matter(changes, matters):
@@ -186,11 +193,20 @@ def test_what_is_below_the_limit_does_not_matter(changes, matters):
         "force": 0.4,
         "limit": 1.2,
         "gap": 1.1,
+        "excess": 9.0,
         "told": False,
         "said": Verdict.UNKNOWN,
         "sigmas": rules.CERTAIN,
     }
     assert rules.matters(**{**known, **changes}) == matters
+
+
+def test_the_words_of_none_that_matters_fit_the_force():
+    """A force above the limit is not said to be below it."""
+    gap = SimpleNamespace(p_value=1e-6)
+    small, large = (SimpleNamespace(value=v, limit=1.2) for v in (0.4, 3.7))
+    assert "below 1.2 N" in nothing_missing(SimpleNamespace(gap=gap, material=small))
+    assert "N" not in nothing_missing(SimpleNamespace(gap=gap, material=large)).removeprefix("N")
 
 
 def test_an_event_stands_beside_an_effect_that_brings_little_more():

@@ -67,6 +67,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         force=size.value,
         limit=size.limit,
         gap=before,
+        excess=gap.excess / gap.excess_std,
         told=base.bench.simulator.study.material is not None,
         said=said,
         sigmas=min(stands.sigmas, default=0.0) if stands else 0.0,

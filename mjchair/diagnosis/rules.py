@@ -41,6 +41,7 @@ SHORT = 0.1  # share of the promise of the linear fit: a fit that misses more st
 LEVEL = 0.01  # of the whole family of tests
 LEAST = 5.0  # standard deviations below which a null made elsewhere shows gaps as well
 SMALL_GAP = 2.0  # rms of the residual over the noise up to which a gap may be none that matters
+SHOWS = 2.0  # standard deviations of the whole residual: less is no more than noise
 CERTAIN = 10.0  # standard errors beyond which an effect is named whatever its size
 MATERIAL = 0.12  # of the chair's own rolling resistance: a force that matters (assumption)
 # what happens once
@@ -175,16 +176,22 @@ def more_missing(choice: Standing, walls: int) -> bool:
 
 
 def matters(
-    *, force: float, limit: float, gap: float, told: bool, said: Verdict, sigmas: float
-) -> bool:
+    *, force: float, limit: float, gap: float, excess: float, told: bool, said: Verdict,
+    sigmas: float,
+) -> bool:  # fmt: skip
     """Whether a gap is one that matters.
 
     Args:
       force: the largest missing force, N. limit: below which none matters, N.
-      gap: rms of the residual over the noise. told: whether the person who asks gave the limit.
+      gap: rms of the residual over the noise. excess: of the whole slow residual above what noise
+        gives, in its standard deviations; what nothing explains and makes none does not matter,
+        however large the force of a test that stands out of many.
+      told: whether the person who asks gave the limit.
       sigmas: of the least certain effect. Without a limit that was told, what is CERTAIN
         matters whatever its size, and a gap of twice the noise is one though no force goes with it.
     """
+    if said == Verdict.UNKNOWN and not told and excess < SHOWS and gap < SMALL_GAP:
+        return False
     if force >= limit or said == Verdict.NONE:
         return True
     certain = said in (Verdict.NAMED, Verdict.AMBIGUOUS) and sigmas > CERTAIN

@@ -45,6 +45,11 @@ def nothing_missing(diagnosis: Diagnosis) -> str:
     gap, material = diagnosis.gap, diagnosis.material
     if gap is None or gap.p_value >= LEVEL or material is None:
         return "Nothing: the chair explains these runs as well as the noise in them allows."
+    if material.value >= material.limit:
+        return (
+            "Nothing that matters: single tests stand out that no effect explains, but all that is "
+            "left together is no more than noise."
+        )
     return (
         "Nothing that matters: more than noise is left, but no missing force is larger than "
         f"{material.value:.2g} N, and below {material.limit:.2g} N none matters."
