@@ -75,11 +75,13 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         said = Verdict.NONE
     named = choice if said in (Verdict.NAMED, Verdict.AMBIGUOUS) else None
     left = missing(choice.after[-1] if choice else gap)
-    plan, unplanned = _plan(base, named) if named and said == Verdict.AMBIGUOUS else (None, [])
+    undecided = named if said == Verdict.AMBIGUOUS else None
+    once = bool(stands and stands.once)
+    plan, unplanned = _plan(base, undecided, once) if undecided else (None, [])
     return Diagnosis(
         verdict=said,
         effects=_named(named.fitted, closed) if named else [],
-        alternatives=_alternatives(base, named) if named and said == Verdict.AMBIGUOUS else [],
+        alternatives=_alternatives(undecided, once) if undecided else [],
         candidates=_candidates(base, gap, choice),
         gap=_summary(base, gap, named),
         where=_where(base),
@@ -158,13 +160,17 @@ def _held_out(base: Base, fitted: Fitted) -> rules.HeldOut | None:
     return rules.HeldOut(before=before, after=_slow(fitted.system, held)[0], dof=dof)
 
 
-def _plan(base: Base, choice: Choice) -> tuple[Plan | None, list[str]]:
-    """The experiments that would decide, and lines on what could not be planned."""
+def _plan(base: Base, choice: Choice, once: bool) -> tuple[Plan | None, list[str]]:
+    """The experiments that would decide, and lines on what could not be planned.
+
+    Args:
+      once: whether something that happened once fits about as well.
+    """
     chosen = choice.fitted
     gained = gain(base, chosen)
     near = [r.fitted for group in choice.rivals for r in group]
     needed = [rules.to_rule_out(behind=r.total - chosen.total, gain=gained) for r in near]
-    if _once(base, choice):
+    if once:
         near.append(base.plain)
         needed.append(rules.to_show_again(event=event.largest(base), gain=choice.hypothesis.gain))
     try:
@@ -183,8 +189,12 @@ def _following(base: Base, said: Verdict, plan: Plan | None, left: list[MissingF
     return ""
 
 
-def _alternatives(base: Base, choice: Choice) -> list[list[str]]:
-    """For every effect, the names that could stand in its place, itself first."""
+def _alternatives(choice: Choice, once: bool) -> list[list[str]]:
+    """For every effect, the names that could stand in its place, itself first.
+
+    Args:
+      once: whether something that happened once fits about as well.
+    """
     out = []
     for start, rivals in zip(choice.hypothesis.starts, choice.rivals, strict=True):
         keys = {s.effect.key for s in choice.hypothesis.starts}
@@ -194,7 +204,7 @@ def _alternatives(base: Base, choice: Choice) -> list[list[str]]:
         names = list(dict.fromkeys([start.effect.name, *new]))
         if len(names) > 1:
             out.append(names)
-    if _once(base, choice):
+    if once:
         out.append([*(s.effect.name for s in choice.hypothesis.starts), EVENT])
     return out
 

@@ -18,6 +18,7 @@ from mjchair.diagnosis.data.windows import Window
 from mjchair.diagnosis.fit import process
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import RoughlyKnown
+from mjchair.diagnosis.fit.noise_levels import FORCES
 from mjchair.diagnosis.fit.nonlinear import Fitted, moved
 from mjchair.diagnosis.fit.process import Process
 from mjchair.diagnosis.fit.variant import Variant
@@ -25,7 +26,7 @@ from mjchair.diagnosis.fit.whitening import Whitener
 from mjchair.diagnosis.next_experiment.manoeuvres import Manoeuvre, Setting
 from mjchair.diagnosis.replay.chair_state import SLOW, STEPS, State
 from mjchair.diagnosis.replay.derivatives import Column
-from mjchair.diagnosis.replay.pulses import Force, Pulse, pulse_answers, pulses
+from mjchair.diagnosis.replay.pulses import Pulse, pulse_answers, pulses
 from mjchair.diagnosis.replay.sensor_errors import SensorErrors
 from mjchair.diagnosis.replay.simulator import Job, WindowSimulator
 from mjchair.diagnosis.replay.window_states import Track
@@ -35,7 +36,6 @@ from mjchair.measurement.trial import Trial
 from mjchair.simulation.initial import start
 
 Array = NDArray[np.float64]
-DISTURBING = (Force.FORWARD, Force.LEFTWARD, Force.YAW)
 TIPPED = 0.8  # of the chair's up axis along the vertical: less is a chair that falls
 FASTEST = 10.0  # m/s, beyond which it is no chair
 # a chair that coasts backwards is not stable: what begins with 0.02 rad/s more may end elsewhere,
@@ -186,16 +186,21 @@ class Rehearsal:
             states.append(
                 self.first[w.run] if first else simulator.carrier.back(model, traces[w.run], at)
             )
-        predicted = self._predict([chair], states)[0]
+        jobs = [
+            Job(self.model(chair), w, s) for w, s in zip(simulator.windows, states, strict=True)
+        ]
+        outcomes = simulator.run(jobs, trace=True)
+        seen = chair.sensor_errors(simulator.channels)
+        predicted = [
+            seen.applied(simulator, w, o.predicted)
+            for w, o in zip(simulator.windows, outcomes, strict=True)
+        ]
         aside = [
             self._predict([chair], [simulator.chair.moved(s, step) for s in states])[0]
             for step in STEPS[:, None] * np.eye(len(SLOW))
         ]
         slow = [np.stack([a[i] - y for a in aside], axis=2) for i, y in enumerate(predicted)]
-        model = simulator.compile(chair.variant.edit)
-        jobs = [Job(model, *pair) for pair in zip(simulator.windows, states, strict=True)]
-        trace = [outcome.trace for outcome in simulator.run(jobs, trace=True)]
-        return Track(states, predicted, slow, trace)
+        return Track(states, predicted, slow, [o.trace for o in outcomes])
 
     def predict(self, chairs: Sequence[Version]) -> list[Column]:
         """What each chair's channels show of every window, from the states of the track."""
@@ -204,7 +209,7 @@ class Rehearsal:
     @cached_property
     def disturbed(self) -> tuple[list[Pulse], list[Array]]:
         """Pulses of the forces that disturb the chair, in every window, and their answers."""
-        asked = [p for p in pulses(self.simulator) if p.force in DISTURBING]
+        asked = [p for p in pulses(self.simulator) if p.force in FORCES.values()]
         return asked, pulse_answers(self.simulator, self.track, asked, self.chair.variant.edit)
 
     def _shaken(self, bench: Bench, known: Process) -> Process:
