@@ -3,8 +3,9 @@
 What it does: takes the lines of `calibration_draws.py`, finds the temper under which what was
 hidden is most probable, and by isotonic regression (scikit-learn) how often a chosen hypothesis was
 right at the odds that the tempered evidence gives. Prints reliability on base studies that the fit
-did not see, each fifth of them in turn, and of the real studies of `calibration_studies.py`.
-In: the folder of draws.jsonl. Out: with --write, mjchair/diagnosis/explain/calibration.toml.
+did not see, each fifth of them in turn, and of the real studies of `calibration_studies.py`, where
+these are there. In: the folder of draws.jsonl. Out: with --write,
+mjchair/diagnosis/explain/calibration.toml.
 
     python benchmarks/calibration.py out/calibration --write
 """
@@ -114,7 +115,9 @@ def fit(studies: Sequence[Drawn], made: str = "") -> Calibration:
         raw = uncalibrated(temper)
         return -float(np.mean([_log_of_truth(raw, s) for s in studies]))
 
-    temper = float(minimize_scalar(miss, (1.0, 6.0), bounds=(1.0, 6.0), options={"xatol": 0.02}).x)
+    temper = float(
+        minimize_scalar(miss, (1.0, 30.0), bounds=(1.0, 30.0), options={"xatol": 0.02}).x
+    )
     raw = uncalibrated(temper)
     kinds: dict[str, list[tuple[float, bool]]] = {name: [] for name in LINES}
     for study in studies:
@@ -153,8 +156,10 @@ def _log_of_truth(known: Calibration, study: Drawn) -> float:
 def _line(pairs: Sequence[tuple[float, bool]]) -> Line:
     """Isotonic regression over groups of GROUP, as a line through both quartiles of each step.
 
-    A step of n studies of which k were right stands at (k + 1) / (n + 2).
+    A step of n studies of which k were right stands at (k + 1) / (n + 2), also of none.
     """
+    if not pairs:
+        return Line(odds=(-FAR, FAR), right=(0.5, 0.5))
     odds, right = np.array(sorted(pairs), float).T
     groups = np.array_split(np.arange(odds.size), max(odds.size // GROUP, 1))
     shares = IsotonicRegression().fit_transform(
@@ -254,7 +259,8 @@ def main() -> None:
     print(table([top(before, s) for _, s in held]).splitlines()[-1], "as it was")
     known = fit(studies, datetime.date.today().isoformat())
     print(known)
-    for study in read(args.out / "real.jsonl"):
+    real = args.out / "real.jsonl"
+    for study in read(real) if real.exists() else ():
         p, right = stated(known, study)
         name = study.chosen.name if study.chosen else "-"
         was = stated(before, study)[0]

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.linalg import cho_factor, cho_solve
 
+from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import gap as gaps
 from mjchair.diagnosis.explain import hypotheses, search
 from mjchair.diagnosis.explain.candidates import Start
@@ -49,11 +50,11 @@ from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.process import KINDS
 from mjchair.diagnosis.fit.system import System
-from mjchair.diagnosis.rules import PENALTY
 from mjchair.effects.effect import step
 
 Array = NDArray[np.float64]
 SIGMAS = (1.5, 100.0)  # size of what is hidden, log-uniform
+FAINT = rules.LEAST  # sigmas below which what is hidden counts as not there
 FORM = (0.005, 0.04)  # relative error of a column's form, log-uniform
 OTHER = 1.5  # sigmas, standard deviation of each unnamed difference of a chair
 SENSORS, LEVELS, RUNS, COLOURS = 0.2, 0.4, 0.25, 0.5  # log standard deviations of the true noise
@@ -68,7 +69,10 @@ BEHIND = 30.0  # chi2 by which a pair may be behind the best single effect
 
 @dataclass(frozen=True)
 class Truth:
-    """What is hidden: keys of effects, or OUTSIDE; none where empty. sigmas: of each."""
+    """What is hidden: keys of effects, or OUTSIDE; none where empty. sigmas: of each.
+
+    What shows less than FAINT is not there: nobody could say so, and it changes no answer.
+    """
 
     keys: tuple[str, ...]
     sigmas: tuple[float, ...]
@@ -76,7 +80,8 @@ class Truth:
     @property
     def name(self) -> str:
         """As a hypothesis is named."""
-        return "+".join(sorted(self.keys)) or NONE
+        seen = [k for k, s in zip(self.keys, self.sigmas, strict=True) if s >= FAINT]
+        return "+".join(sorted(seen)) or NONE
 
 
 class Bed:
@@ -332,6 +337,10 @@ class LinearSearch(search.Search):
             return None
         return _fit(self.base, hypothesis)
 
+    def _beside_part(self, hypothesis: Hypothesis, fitted: Any) -> Any:
+        """The fit itself: a linear one never goes astray."""
+        return fitted
+
     def anew(self, tried: Any) -> Any:
         """The fit itself: a linear system is the same around any chair."""
         return tried.fitted
@@ -460,7 +469,7 @@ class Weighing:
             - free.total
             + float(right @ (np.linalg.solve(unit, right / scale) / scale))
         )
-        penalty = PENALTY * sum(len(s.free) for s in starts)
+        penalty = rules.PENALTY * sum(len(s.free) for s in starts)
         prior = 2.0 * sum(math.log(s.effect.common) for s in starts)
         return gain - penalty + prior < self.best.get(id(reduced), -np.inf) - BEHIND
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import calibration, hypotheses
 from mjchair.diagnosis.explain.calibration import Chosen, Weight
 from mjchair.diagnosis.explain.candidates import Start
@@ -78,13 +79,13 @@ def fit(known, one):
     return SimpleNamespace(hypothesis=hypothesis, fitted=fitted)
 
 
-def chosen(known, name, rivals=()):
-    """The choice of one effect, which leaves no gap; every effect was fitted."""
+def chosen(known, name, rivals=(), gap_left=False):
+    """The choice of one effect; every effect was fitted."""
     fits = {s.effect.name: fit(known, s) for s in known.starts}
     return SimpleNamespace(
         **vars(fits[name]),
         tried=list(fits.values()),
-        after=[SimpleNamespace(exists=False)],
+        after=[SimpleNamespace(exists=gap_left)],
         rivals=[[fits[r] for r in rivals]],
     )
 
@@ -102,16 +103,32 @@ def test_a_clear_effect_is_nearly_certain():
     made = base(2.0)
     known = probabilities(made, chosen(made, "rolling_resistance"))
     assert sum(known.values()) == pytest.approx(1.0)
-    assert of_effects(known, ["rolling_resistance"]) > 0.99
+    assert of_effects(known, ["rolling_resistance"]) > rules.PROBABLE
+
+
+def test_a_force_of_any_form_speaks_against_effects_only_where_they_leave_a_gap():
+    made = base(2.0, force=2.0)
+    whole, rest = (
+        of_effects(
+            probabilities(made, chosen(made, "rolling_resistance", gap_left=left)),
+            ["rolling_resistance"],
+        )
+        for left in (False, True)
+    )
+    assert whole > rules.PROBABLE > 0.9 > rest
 
 
 def test_a_linear_gain_that_the_fitted_chair_has_already_speaks_for_nothing():
     """A force gains 400 by linear algebra, of which the chair without effects takes 390."""
     made = base(2.0, force=2.0)
-    assert probabilities(made, chosen(made, "rolling_resistance"))[OUTSIDE] > 0.1
+
+    def there():
+        choice = chosen(made, "rolling_resistance", gap_left=True)
+        return of_effects(probabilities(made, choice), ["rolling_resistance"])
+
+    before = there()
     made.plain.total -= 390.0
-    known = probabilities(made, chosen(made, "rolling_resistance"))
-    assert of_effects(known, ["rolling_resistance"]) > 0.99
+    assert there() > before + 0.05
 
 
 def test_effects_that_look_alike_share_it_the_common_one_first():

@@ -10,13 +10,16 @@ its sealed answer. Frames are those of ISO 8855; all numbers are SI.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 from generator import MANOEUVRES, SEAL, Case, Manoeuvre, _write, scaled, seal
 from numba import njit
 from numpy.typing import NDArray
+from scipy.linalg import block_diag, cho_factor, cho_solve
 from scipy.signal import butter, filtfilt
 
 Array = NDArray[np.float64]
@@ -70,7 +73,14 @@ HIDDEN = (
 )  # fmt: skip
 NAMES = (*CHAIR, *HIDDEN)
 PLACE = {name: i for i, name in enumerate(NAMES)}
-RIPPLES = 12
+LENGTHS = np.geomspace(0.15, 3.0, 12)  # m, of the floor's ripples
+RIPPLES = LENGTHS.size
+RIPPLE = 0.0006  # slope of each
+JOINT = 0.02  # slope of a joint of the floor
+COLOUR = 0.25  # s, correlation time of what pushes and twists the chair
+GAIN = 0.01  # standard deviation of a sensor's gain
+GAINED = ("speed", "gyro", "accel")  # of sensors whose names hold one of these
+BIAS = {"imu_gyro.z": 0.003, "imu_accelerometer.x": 0.05}  # as documented, of calibrated sensors
 
 (
     MASS, IZ, COM_X, COM_Y, COM_Z, HALF, R_LEFT, R_RIGHT, I_WHEEL, CASTER_X, CASTER_Y, TRAIL,
@@ -95,7 +105,7 @@ def brush(slip_x, slip_y, stiffness, load, friction):
 
 
 @njit(cache=True)
-def ripple(x, y, waves):
+def ripple(x, y, waves, joints):
     """Slope of the floor along x at a place: ripples (k, amplitude, phase, direction), joints."""
     slope = 0.0
     for i in range(waves.shape[0]):
@@ -103,12 +113,12 @@ def ripple(x, y, waves):
         slope += a * np.sin(k * (x * np.cos(way) + y * np.sin(way)) + p)
     joint = (x % 0.6) / 0.012  # a joint every 0.6 m, 12 mm wide: down, then up
     if joint < 1.0:
-        slope += 0.02 * np.sin(2.0 * np.pi * joint)
+        slope += joints * np.sin(2.0 * np.pi * joint)
     return slope
 
 
 @njit(cache=True)
-def rates(t, s, p, waves, grid_step, torque, noise):
+def rates(t, s, p, waves, joints, grid_step, torque, noise):
     """Time derivative of the state."""
     d = np.zeros(s.size)
     yaw, u, v, r = s[2], s[3], s[4], s[5]
@@ -151,7 +161,7 @@ def rates(t, s, p, waves, grid_step, torque, noise):
         along -= 0.003 * stiff * d[18 + k]
         across -= 0.003 * stiff * d[14 + k]
         px, py = s[0] - sin * y, s[1] + cos * y
-        level = ripple(px, py, waves)
+        level = ripple(px, py, waves, joints)
         fx = ct * along - st * across - load * level
         fy = st * along + ct * across
         drive = (left * (1.0 + p[GAIN_L])) if k == 0 else (right * (1.0 + p[GAIN_R]))
@@ -188,7 +198,7 @@ def rates(t, s, p, waves, grid_step, torque, noise):
         across -= 0.003 * p[C_CASTER] * load / p[S_CASTER] * d[16 + k]
         px, py = s[0] + cos * cx - sin * cy, s[1] + sin * cx + cos * cy
         along = -(p[RR_CASTER] + p[ROLLING]) * load * np.tanh(vx / 0.01)
-        fx = cw * along - sw * across - load * ripple(px, py, waves)
+        fx = cw * along - sw * across - load * ripple(px, py, waves, joints)
         fy = sw * along + cw * across
         moment = -p[TRAIL] * (-np.sin(angle) * fx + np.cos(angle) * fy)
         stem = p[C_SWIVEL] * s[12 + k] + p[CASTER_FRICTION] * np.tanh(s[12 + k] / 0.05)
@@ -239,7 +249,7 @@ def rates(t, s, p, waves, grid_step, torque, noise):
 
 
 @njit(cache=True)
-def integrate(first, count, p, waves, grid_step, torque, noise):
+def integrate(first, count, p, waves, joints, grid_step, torque, noise):
     """States (count, STATES) at every grid step: Runge-Kutta of fourth order, SUBSTEPS a step.
 
     An integrator that chooses its steps takes a hundred times longer over the floor's joints.
@@ -251,10 +261,10 @@ def integrate(first, count, p, waves, grid_step, torque, noise):
         out[i] = s
         for k in range(SUBSTEPS):
             t = (i + k / SUBSTEPS) * grid_step
-            a = rates(t, s, p, waves, grid_step, torque, noise)
-            b = rates(t + 0.5 * h, s + 0.5 * h * a, p, waves, grid_step, torque, noise)
-            c = rates(t + 0.5 * h, s + 0.5 * h * b, p, waves, grid_step, torque, noise)
-            e = rates(t + h, s + h * c, p, waves, grid_step, torque, noise)
+            a = rates(t, s, p, waves, joints, grid_step, torque, noise)
+            b = rates(t + 0.5 * h, s + 0.5 * h * a, p, waves, joints, grid_step, torque, noise)
+            c = rates(t + 0.5 * h, s + 0.5 * h * b, p, waves, joints, grid_step, torque, noise)
+            e = rates(t + h, s + h * c, p, waves, joints, grid_step, torque, noise)
             s = s + h / 6.0 * (a + 2.0 * b + 2.0 * c + e)
     return out
 
@@ -264,12 +274,13 @@ class Chair:
     """Numbers of one chair and its floor.
 
     Attributes:
-      p: (numbers,) in the order of NAMES. waves: (RIPPLES, 4) of the floor.
+      p: (numbers,) in the order of NAMES. waves: (RIPPLES, 4) of the floor. joints: slope at one.
       push, twist: standard deviations of the coloured disturbance, N and N m.
     """
 
     p: Array
     waves: Array
+    joints: float
     push: float
     twist: float
 
@@ -287,17 +298,17 @@ def chair(rng: np.random.Generator, hidden: dict[str, dict[str, float]]) -> Chai
     values |= dict.fromkeys(HIDDEN, 0.0)
     for name, given in hidden.items():
         _hide(values, name, given)
-    k = 2.0 * np.pi / np.geomspace(0.15, 3.0, RIPPLES)
+    k = 2.0 * np.pi / LENGTHS
     waves = np.column_stack(
         [
             k,
-            np.full(RIPPLES, 0.0006 * rng.uniform(0.5, 1.5)),
+            np.full(RIPPLES, RIPPLE * rng.uniform(0.5, 1.5)),
             rng.uniform(0.0, 2.0 * np.pi, RIPPLES),
             rng.uniform(-0.4, 0.4, RIPPLES),
         ]
     )
     push, twist = 0.8 * rng.uniform(0.4, 1.6), 0.15 * rng.uniform(0.4, 1.6)
-    return Chair(np.array([values[n] for n in NAMES]), waves, push, twist)
+    return Chair(np.array([values[n] for n in NAMES]), waves, JOINT, push, twist)
 
 
 def _hide(v: dict[str, float], name: str, given: dict[str, float]) -> None:
@@ -352,21 +363,32 @@ def drive(c: Chair, man: Manoeuvre, seconds: float, seed: int) -> tuple[Array, A
     """One run: times (n,), states (n, STATES), and the torques (n, 2) that the table tells."""
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, seconds, 1.0 / FINE)
-    torque = np.array([man.torque(t) if man.torque else (0.0, 0.0) for t in time], float)  # type: ignore[operator]
+    torque = _torque(man, time)
     noise = np.column_stack([_coloured(rng, time.size, s) for s in (c.push, c.twist)])
-    first = np.zeros(STATES)
-    first[:3] = *man.position, man.heading
-    first[3], first[5] = man.speed, man.yaw
-    first[6:8] = man.speed / c.p[[R_LEFT, R_RIGHT]]
-    states = integrate(first, time.size, c.p, c.waves, 1.0 / FINE, torque, noise)
+    first = _first(man, c.p)
+    states = integrate(first, time.size, c.p, c.waves, c.joints, 1.0 / FINE, torque, noise)
     if not np.isfinite(states).all():
         raise RuntimeError(f"planar run {man.name}: the state is not finite")
     return time, states, torque
 
 
-def _coloured(rng: np.random.Generator, n: int, std: float, time: float = 0.25) -> Array:
-    """An Ornstein-Uhlenbeck force of a correlation time, on the fine grid."""
-    keep = np.exp(-1.0 / (FINE * time))
+def _torque(man: Manoeuvre, time: Array) -> Array:
+    """Torques (n, 2) of a manoeuvre, N m."""
+    return np.array([man.torque(t) if man.torque else (0.0, 0.0) for t in time], float)
+
+
+def _first(man: Manoeuvre, p: Array) -> Array:
+    """The state in which a run begins."""
+    first = np.zeros(STATES)
+    first[:3] = *man.position, man.heading
+    first[3], first[5] = man.speed, man.yaw
+    first[6:8] = man.speed / p[[R_LEFT, R_RIGHT]]
+    return first
+
+
+def _coloured(rng: np.random.Generator, n: int, std: float) -> Array:
+    """An Ornstein-Uhlenbeck force of the correlation time COLOUR, on the fine grid."""
+    keep = np.exp(-1.0 / (FINE * COLOUR))
     out = np.empty(n)
     out[0] = std * rng.standard_normal()
     kicks = std * np.sqrt(1.0 - keep**2) * rng.standard_normal(n)
@@ -400,10 +422,13 @@ class Senses:
 def senses(rng: np.random.Generator) -> Senses:
     """Gains 1 % off, a filter of 4 to 8 Hz, some channels at half the rate."""
     names = Senses({}, 0.0, {}).noise
-    gained = [n for n in names if "speed" in n or "gyro" in n or "accel" in n]
-    gains = {n: 1.0 + 0.01 * rng.standard_normal() for n in gained}
+    gains = {n: 1.0 + GAIN * rng.standard_normal() for n in names if _has_gain(n)}
     every = {n: 2 for n in names if n.startswith(("position", "heading"))}
     return Senses(gains, rng.uniform(4.0, 8.0), every)
+
+
+def _has_gain(channel: str) -> bool:
+    return any(part in channel for part in GAINED)
 
 
 def exact(c: Chair, time: Array, states: Array) -> dict[str, Array]:
@@ -456,67 +481,135 @@ def sense(
     return table_time, out
 
 
-def _runs(
-    case: Case, seed: int, which: tuple[int, ...], seconds: float, again: int = 0
-) -> list[dict[str, Array]]:
-    """Exact channels of some trials; `again` draws other disturbances."""
+def _runs(case: Case, seed: int, which: tuple[int, ...], seconds: float) -> list[dict[str, Array]]:
+    """Exact channels of some trials."""
     c = chair(np.random.default_rng([seed, 2]), case.hidden)
-    return [
-        exact(c, *drive(c, MANOEUVRES[k], seconds, 1000 * seed + 17 * again + k)[:2]) for k in which
-    ]
+    return [exact(c, *drive(c, MANOEUVRES[k], seconds, 1000 * seed + k)[:2]) for k in which]
 
 
-REPLICATES = 8
-
-
-def _parts(runs: list[dict[str, Array]], noise: dict[str, float], afresh: bool = True) -> Array:
-    """All channels of runs over their noise, averaged in steps of 0.1 s.
+def _parts(run: dict[str, Array], noise: dict[str, float], afresh: bool = True) -> Array:
+    """All channels of a run over their noise, averaged in steps of 0.1 s.
 
     Args:
       afresh: each 2 s is taken less a line, since a window may start from another state.
     """
     out = []
     width = int(FINE / 10)
-    for run in runs:
-        for name, std in noise.items():
-            x = run[name][: len(run[name]) // width * width].reshape(-1, width).mean(axis=1)
-            for first in range(0, x.size, 20):
-                part = x[first : first + 20]
-                t = np.arange(part.size)
-                if afresh and part.size > 3:
-                    part = part - np.polyval(np.polyfit(t, part, 1), t)
-                out.append(part / (std / np.sqrt(width * RATE / FINE)))
+    for name, std in noise.items():
+        x = run[name][: len(run[name]) // width * width].reshape(-1, width).mean(axis=1)
+        for first in range(0, x.size, 20):
+            part = x[first : first + 20]
+            t = np.arange(part.size)
+            if afresh and part.size > 3:
+                part = part - np.polyval(np.polyfit(t, part, 1), t)
+            out.append(part / (std / np.sqrt(width * RATE / FINE)))
     return np.concatenate(out)
+
+
+HAT = 0.2  # s, half the width of the triangles of force that a disturbance is made of
+SMALL = 0.3  # N and N m of them: small enough to add up
+
+
+@dataclass
+class Answers:
+    """What disturbances of one standard deviation change in a manoeuvre of the chair as designed.
+
+    Attributes:
+      pushes, twists: (samples, hats) of a force of 1 N forward and a moment of 1 N m, coloured.
+      floor: (samples, 2 RIPPLES) of the sine and cosine of every ripple, and the joints, last.
+    """
+
+    pushes: Array
+    twists: Array
+    floor: Array
+
+
+@cache
+def answers(manoeuvre: int, seconds: float) -> Answers:
+    """Simulated once for each manoeuvre, one triangle of force and one ripple after the other."""
+    man, noise = MANOEUVRES[manoeuvre], Senses({}, 0.0, {}).noise
+    p = np.array([*CHAIR.values(), *(0.0 for _ in HIDDEN)])
+    time = np.arange(0.0, seconds, 1.0 / FINE)
+    torque = _torque(man, time)
+    first = _first(man, p)
+
+    def parts(push: Array, waves: Array, joints: float = 0.0) -> Array:
+        states = integrate(first, time.size, p, waves, joints, 1.0 / FINE, torque, push)
+        return _parts(exact(Chair(p, waves, joints, 0.0, 0.0), time, states), noise)
+
+    still, level = np.zeros((time.size, 2)), np.zeros((1, 4))
+    plain = parts(still, level)
+    middles = np.arange(0.0, seconds + HAT, HAT)
+    hats = np.clip(1.0 - np.abs(time[:, None] - middles) / HAT, 0.0, None)
+    cover = np.exp(-np.abs(middles[:, None] - middles) / COLOUR)
+    root = np.linalg.cholesky(cover + 1e-9 * np.eye(middles.size))
+    moved = []
+    for axis in range(2):
+        shape = np.eye(2)[axis] * SMALL
+        pushed = [parts(hat[:, None] * shape, level) - plain for hat in hats.T]
+        moved.append(np.array(pushed).T / SMALL @ root)
+    waves = [[k, RIPPLE, phase, 0.0] for k in 2.0 * np.pi / LENGTHS for phase in (0.0, 0.5 * np.pi)]
+    floor = [parts(still, np.array([w])) - plain for w in waves]
+    floor.append(parts(still, level, JOINT) - plain)
+    return Answers(*moved, np.array(floor).T)
+
+
+def _disturbances(c: Chair, which: tuple[int, ...], seconds: float) -> Array:
+    """Columns (samples of all trials, k) of one standard deviation of what disturbs a chair.
+
+    Pushes and twists are each trial's own; the floor is one.
+    """
+    known = [answers(k, seconds) for k in which]
+    own = [np.hstack([c.push * a.pushes, c.twist * a.twists]) for a in known]
+    return np.hstack([block_diag(*own), np.vstack([a.floor for a in known])])
+
+
+def _sensed(right: Sequence[dict[str, Array]], noise: dict[str, float], faulty: bool) -> Array:
+    """Columns of one standard deviation of what is roughly known of sensors: gains, and biases.
+
+    Args:
+      faulty: for what sets one channel against another, which no start afresh every 2 s hides.
+    """
+    errors = [(n, GAIN, 0.0) for n in noise if _has_gain(n)] + [
+        (n, 0.0, b) for n, b in BIAS.items()
+    ]
+    out = []
+    for name, gain, bias in errors:
+        error = [{**r, name: gain * r[name] + bias} for r in right]
+        parts = [_parts(e, {name: noise[name]}, not faulty) for e in error]
+        at = list(noise).index(name)
+        whole = [np.zeros((len(noise), p.size)) for p in parts]
+        for w, p in zip(whole, parts, strict=True):
+            w[at] = p
+        out.append(np.concatenate([w.ravel() for w in whole]))
+    return np.array(out).T
 
 
 def size(case: Case, seed: int, which: tuple[int, ...], seconds: float) -> None:
     """Scale what is hidden until it shows at about case.sigma of the whole noise.
 
-    The whole noise is the sensors', and what the disturbances of replicated runs change.
+    The whole noise is the sensors', what pushes and twists the chair, a floor like its own, and
+    what is roughly known of the sensors.
     """
     noise = Senses({}, 0.0, {}).noise
-    nothing = Case("none")
-    right = _runs(nothing, seed, which, seconds)
-    plain, flat = _parts(right, noise), _parts(right, noise, False)
-    others = np.array(
-        [
-            _parts(_runs(nothing, seed, which, seconds, 1 + k), noise) - plain
-            for k in range(REPLICATES)
-        ]
-    ) / np.sqrt(2.0 * REPLICATES)
+    sensor = any(name.startswith("sensor") for name in case.hidden)
+    faulty = sensor or "wheel_radius" in case.hidden
+    right = _runs(Case("none"), seed, which, seconds)
+    plain = np.concatenate([_parts(r, noise, not faulty) for r in right])
+    c = chair(np.random.default_rng([seed, 2]), {})
+    free = np.hstack([_disturbances(c, which, seconds), _sensed(right, noise, faulty)])
+    inner = cho_factor(np.eye(free.shape[1]) + free.T @ free)
     for name in case.hidden:
         first, factor = dict(case.hidden[name]), 1.0
-        for _ in range(4):
+        for _ in range(6):
             case.hidden[name] = scaled(first, name, factor)
-            if name.startswith("sensor"):
-                moved = _parts([_faulty(case, r) for r in right], noise, False) - flat
+            if sensor:
+                runs = [_faulty(case, r) for r in right]
             else:
-                one = Case("one", {name: case.hidden[name]})
-                moved = _parts(_runs(one, seed, which, seconds), noise) - plain
-            # (I + D^T D)^-1 by Woodbury: disturbances are a few directions with known size
-            inner = np.eye(REPLICATES) + others @ others.T
-            along = others @ moved
-            left = moved @ moved - along @ np.linalg.solve(inner, along)
+                runs = _runs(Case("one", {name: case.hidden[name]}), seed, which, seconds)
+            moved = np.concatenate([_parts(r, noise, not faulty) for r in runs]) - plain
+            along = free.T @ moved  # (I + F F')^-1 by Woodbury
+            left = moved @ moved - along @ cho_solve(inner, along)
             case.reached[name] = float(np.sqrt(max(left, 0.0)))
             by = case.sigma / max(case.reached[name], 1e-6)
             if 0.8 < by < 1.25:

@@ -170,8 +170,14 @@ def tried(
     """The hypotheses that a choice is held against: those that were fitted; without one, all.
 
     How many others a linear promise brings near says more of how many there are than of the choice.
+    A force of any form fits whatever an effect fits: it speaks only where the choice leaves a gap.
     """
-    return {n: v for n, v in logs.items() if chosen is None or weights[n].fitted}
+    if chosen is None:
+        return dict(logs)
+    known = {n: v for n, v in logs.items() if weights[n].fitted}
+    if not chosen.gap_left:
+        known.pop(OUTSIDE, None)
+    return known
 
 
 def holds(name: str, wanted: str) -> bool:

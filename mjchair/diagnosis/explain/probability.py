@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import calibration, hypotheses
 from mjchair.diagnosis.explain.calibration import NONE, OUTSIDE, Chosen, Weight
 from mjchair.diagnosis.explain.candidates import Start
@@ -91,8 +90,8 @@ def weights(base: Base, choice: Choice | None) -> dict[str, Weight]:
     if choice is not None:
         for h in hypotheses.pairs(reduced, starts):
             add(h, PRIOR_TWO)
-        if len(choice.hypothesis.starts) == rules.MOST:
-            add(choice.hypothesis, PRIOR_THREE)
+        # what was left of three effects need not be among the first pairs
+        add(choice.hypothesis, (one, PRIOR_TWO, PRIOR_THREE)[len(choice.hypothesis.starts) - 1])
     return out
 
 
