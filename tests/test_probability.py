@@ -19,7 +19,7 @@ from mjchair.diagnosis.explain.column_ids import (
     ForceGroup,
     Quantity,
 )
-from mjchair.diagnosis.explain.probability import NONE, OUTSIDE, of_effects, probabilities
+from mjchair.diagnosis.explain.probability import NONE, OUTSIDE, of_any, of_effects, probabilities
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import RoughlyKnown
 from mjchair.diagnosis.fit.process import KINDS
@@ -149,6 +149,7 @@ def test_pairs_that_hold_an_effect_count_for_it():
     known = {"a": 0.5, "a+b": 0.3, "b": 0.1, "none": 0.1}
     assert of_effects(known, ["a"]) == pytest.approx(0.8)
     assert of_effects(known, ["a", "b"]) == pytest.approx(0.3)
+    assert of_any(known, ["a", "b"]) == pytest.approx(0.9)
 
 
 def weights(evidence):

@@ -186,6 +186,9 @@ def test_what_an_answer_leaves_is_said():
         ({"force": 4.0, "excess": 1.9, "gap": rules.SMALL_GAP}, True),
         ({"force": 4.0, "excess": 1.9, "told": True}, True),
         ({"force": 4.0, "excess": 1.9, "said": Verdict.NAMED}, True),
+        # an answer that is rather not there is none, unless something shows
+        ({"force": 4.0, "excess": 1.9, "said": Verdict.AMBIGUOUS, "probability": 0.49}, False),
+        ({"force": 4.0, "excess": 2.1, "said": Verdict.AMBIGUOUS, "probability": 0.49}, True),
     ],
 )
 def test_what_is_below_the_limit_does_not_matter(changes, matters):
@@ -197,6 +200,7 @@ def test_what_is_below_the_limit_does_not_matter(changes, matters):
         "told": False,
         "said": Verdict.UNKNOWN,
         "sigmas": rules.CERTAIN,
+        "probability": 0.9,
     }
     assert rules.matters(**{**known, **changes}) == matters
 

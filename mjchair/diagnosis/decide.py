@@ -19,7 +19,7 @@ from mjchair.diagnosis.explain.choice import Choice, closure, gain
 from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.explain.gap import Gap, forces_left
 from mjchair.diagnosis.explain.left_out import held_out, held_out_gain
-from mjchair.diagnosis.explain.probability import of_effects, probabilities
+from mjchair.diagnosis.explain.probability import of_any, of_effects, probabilities
 from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import ParameterId
@@ -71,6 +71,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         told=base.bench.simulator.study.material is not None,
         said=said,
         sigmas=min(stands.sigmas, default=0.0) if stands else 0.0,
+        probability=of_any(probability, _standing_keys(choice)) if choice else 0.0,
     ):
         said = Verdict.NONE
     named = choice if said in (Verdict.NAMED, Verdict.AMBIGUOUS) else None
@@ -127,6 +128,12 @@ def standing(
         runs=len(base.bench.simulator.study.fitted),
         held_out=_held_out(base, fitted),
     )
+
+
+def _standing_keys(choice: Choice) -> set[str]:
+    """Keys of the chosen effects and of all that could stand in their places."""
+    rivals = {key for group in choice.rivals for r in group for key in r.hypothesis.keys}
+    return {*choice.hypothesis.keys, *rivals}
 
 
 def _once(base: Base, choice: Choice) -> bool:
@@ -231,12 +238,12 @@ def _candidates(base: Base, gap: Gap, choice: Choice | None) -> list[Candidate]:
     total = gain(base, choice.fitted) if choice else max(gap.excess, 1.0)
     for h in hypotheses.singles(base.reduced, base.starts):
         columns = base.system.index(h.columns)
-        gains = held_out(base.bench, (base.system, []), (base.system, columns))
+        gained = held_out(base.bench, (base.system, []), (base.system, columns))
         effect = h.starts[0].effect
         out.append(
             Candidate(
                 name=effect.name,
-                held_out_gain=float(gains.sum()),
+                held_out_gain=gained,
                 closure=float(np.clip(h.gain / max(total, h.gain, 1e-9), 0.0, 1.0)),
                 detectability=float(np.sqrt(max(h.gain, 0.0))),
                 p_value=float(stats.chi2.sf(h.gain, len(h.columns))),

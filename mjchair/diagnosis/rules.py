@@ -21,6 +21,7 @@ CLOSES = 0.8  # share of the excess that a named effect closes
 PARTLY = 0.5  # share that an effect closes which is part of an answer, with a remainder
 CARRIED = 0.5  # share of the excess on held-out trials that it closes there
 PROBABLE = 0.95  # probability of a named effect
+LIKELY = 0.5  # probability of an answer to a residual that is no more than noise
 HELD = 10.0  # chi2 that it must bring on runs that it was not fitted to
 SIGMAS = 4.0  # standard errors of a parameter away from neutral
 # what keeps a rival
@@ -177,20 +178,22 @@ def more_missing(choice: Standing, walls: int) -> bool:
 
 def matters(
     *, force: float, limit: float, gap: float, excess: float, told: bool, said: Verdict,
-    sigmas: float,
+    sigmas: float, probability: float,
 ) -> bool:  # fmt: skip
     """Whether a gap is one that matters.
 
     Args:
       force: the largest missing force, N. limit: below which none matters, N.
       gap: rms of the residual over the noise. excess: of the whole slow residual above what noise
-        gives, in its standard deviations; what nothing explains and makes none does not matter,
-        however large the force of a test that stands out of many.
+        gives, in its standard deviations; what makes none and is explained by nothing, or by what
+        is rather not there, does not matter, however large the force of a test that stands out.
       told: whether the person who asks gave the limit.
+      probability: that an effect of the answer is there.
       sigmas: of the least certain effect. Without a limit that was told, what is CERTAIN
         matters whatever its size, and a gap of twice the noise is one though no force goes with it.
     """
-    if said == Verdict.UNKNOWN and not told and excess < SHOWS and gap < SMALL_GAP:
+    answered = said != Verdict.UNKNOWN and probability >= LIKELY
+    if not answered and not told and excess < SHOWS and gap < SMALL_GAP:
         return False
     if force >= limit or said == Verdict.NONE:
         return True

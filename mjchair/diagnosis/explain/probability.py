@@ -10,7 +10,7 @@ evidence to probabilities it goes by a stored calibration (calibration.py).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +63,12 @@ def of_effects(probability: Mapping[str, float], keys: Sequence[str]) -> float:
     """Probability that these effects are there, alone or with others."""
     wanted = set(keys)
     return sum(p for name, p in probability.items() if wanted <= set(name.split("+")))
+
+
+def of_any(probability: Mapping[str, float], keys: Iterable[str]) -> float:
+    """Probability that at least one of these effects is there."""
+    wanted = set(keys)
+    return sum(p for name, p in probability.items() if wanted & set(name.split("+")))
 
 
 def weights(base: Base, choice: Choice | None) -> dict[str, Weight]:

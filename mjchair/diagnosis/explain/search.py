@@ -157,7 +157,7 @@ class Search:
         return rules.worth_adding(
             gained=one.total - other.total,
             parameters=more.hypothesis.free - best.hypothesis.free,
-            held=float(held.sum()),
+            held=held,
         )
 
     def without_needless(self, tried: Tried) -> Tried:

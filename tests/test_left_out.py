@@ -1,0 +1,74 @@
+"""What effects bring on runs that no fit saw: consistent ones bring it, others nothing."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mjchair.diagnosis.explain.left_out import held_out
+from mjchair.diagnosis.fit.column_ids import RoughlyKnown
+from mjchair.diagnosis.fit.system import System
+
+ROWS = 40
+DRAWS = 20
+
+
+def system(columns, y):
+    """Two runs of two windows each: columns (rows, effects) and data (rows,) of every window."""
+    count = columns[0].shape[1]
+    return System(
+        columns=[RoughlyKnown(f"c{k}") for k in range(count)],
+        nuisance=0,
+        G=np.array([J.T @ J for J in columns]),
+        b=np.array([J.T @ r for J, r in zip(columns, y, strict=True)]),
+        c=np.array([r @ r for r in y]),
+        run=np.array([0, 0, 1, 1]),
+        back=np.zeros(0),
+    )
+
+
+BENCH = SimpleNamespace(
+    windows=np.arange(4),
+    simulator=SimpleNamespace(
+        study=SimpleNamespace(runs=[SimpleNamespace(manoeuvre=m) for m in ("push", "slalom")])
+    ),
+)
+
+
+def gains(columns, sizes, seed=0):
+    """Of the columns, over draws of the noise; `sizes`: true coefficients of every window."""
+    rng = np.random.default_rng(seed)
+    out = []
+    for _ in range(DRAWS):
+        y = [J @ s + rng.standard_normal(ROWS) for J, s in zip(columns, sizes, strict=True)]
+        made = system(columns, y)
+        out.append(held_out(BENCH, (made, []), (made, list(range(columns[0].shape[1])))))
+    return np.array(out)
+
+
+def unit(rng, count):
+    return np.linalg.qr(rng.standard_normal((ROWS, count)))[0]
+
+
+def test_an_effect_that_is_the_same_in_both_runs_brings_about_what_it_gains():
+    J = 10.0 * unit(np.random.default_rng(1), 1)
+    assert gains([J] * 4, [[1.0]] * 4).mean() == pytest.approx(400.0, rel=0.05)
+
+
+def test_an_effect_that_turns_round_from_run_to_run_brings_nothing():
+    J = 10.0 * unit(np.random.default_rng(1), 1)
+    assert gains([J] * 4, [[1.0], [1.0], [-1.0], [-1.0]]).max() < -100.0
+
+
+def test_an_effect_where_nothing_is_brings_nothing():
+    J = 10.0 * unit(np.random.default_rng(1), 1)
+    assert gains([J] * 4, [[0.0]] * 4).mean() < 0.0
+
+
+def test_what_a_run_cannot_tell_it_does_not_foretell():
+    """A push tells the sum of two numbers, a slalom their difference: together they tell both."""
+    a, b = unit(np.random.default_rng(2), 2).T
+    push = np.column_stack([20.0 * a + 0.1 * b, 20.0 * a - 0.1 * b])
+    slalom = np.column_stack([20.0 * b + 0.1 * a, -20.0 * b + 0.1 * a])
+    found = gains([push, push, slalom, slalom], [[1.0, 0.0]] * 4)
+    assert found.min() > 500.0  # of 1600; a point estimate from one run foretells the other wrongly
