@@ -428,7 +428,12 @@ def base_of(bed: Bed, y: Sequence[Array]) -> Any:
         variant=SimpleNamespace(terms=()),
     )
     return SimpleNamespace(
-        bench=bench, plain=plain, reduced=reduced, system=system, starts=bed.kept.starts
+        bench=bench,
+        plain=plain,
+        reduced=reduced,
+        system=system,
+        starts=bed.kept.starts,
+        found=None,
     )
 
 

@@ -3,6 +3,8 @@ found again on small systems; none of them is moved by what an effect makes."""
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
+from scipy.stats import multivariate_normal
 
 from mjchair.diagnosis.fit import noise_levels
 from mjchair.diagnosis.fit.noise_levels import Levels, WindowColumns
@@ -71,7 +73,7 @@ def found(drawn, fixed=frozenset()):
         wobbles={},
         bands=np.ones((2, len(EDGES))),
     )
-    return noise_levels.estimate(drawn, first, np.full(2, 1e-4), fixed, steps=40)
+    return noise_levels.estimate(drawn, first, np.full((2, len(EDGES)), 1e-4), fixed, steps=40)
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +108,36 @@ def test_a_level_that_a_person_gave_stays():
     np.testing.assert_array_equal(kept.parts[Part.DRIVE_FAST], KINDS[Part.DRIVE_FAST].first)
 
 
+def test_the_deviance_is_that_of_all_numbers_together():
+    """Against the density of the normal distribution that the levels make of three windows."""
+    drawn = windows(np.random.default_rng(3), effect=1.0)[:3]
+    levels = Levels(
+        parts={part: np.full(RUNS, 0.5 * kind.first) for part, kind in KINDS.items()},
+        wobbles={},
+        bands=POWER,
+    )
+    J = np.vstack([w.J for w in drawn])
+    cover = block_diag(
+        *(
+            np.diag(POWER[w.channel, w.band])
+            + w.Z @ w.Z.T
+            + sum(
+                levels.parts[part][w.run] ** 2
+                * w.pulses[kind.force]
+                @ w.correlations[part]
+                @ w.pulses[kind.force].T
+                for part, kind in KINDS.items()
+            )
+            for w in drawn
+        )
+    )
+    law = multivariate_normal(cov=cover + J @ J.T)
+    r = np.concatenate([w.r for w in drawn])
+    constant = r.size * np.log(2.0 * np.pi)
+    expected = -2.0 * law.logpdf(r) - constant
+    assert noise_levels.deviance(drawn, levels) == pytest.approx(expected, rel=1e-6)
+
+
 def test_what_shakes_harder_than_it_can_is_left_in_the_gap():
     drawn = windows(np.random.default_rng(1))
     first = Levels(
@@ -113,7 +145,9 @@ def test_what_shakes_harder_than_it_can_is_left_in_the_gap():
         wobbles={},
         bands=np.ones((2, len(EDGES))),
     )
-    held = noise_levels.estimate(drawn, first, np.full(2, 1e-4), most={Force.FORWARD: 0.7})
+    held = noise_levels.estimate(
+        drawn, first, np.full((2, len(EDGES)), 1e-4), most={Force.FORWARD: 0.7}
+    )
     assert held.parts[Part.DRIVE_FAST].max() == pytest.approx(0.7)
     assert held.parts[Part.YAW_FAST].max() > 0.4
 

@@ -64,6 +64,7 @@ def searching():
         plain=SimpleNamespace(total=2000.0),
         reduced=SimpleNamespace(total=2000.0),
         around=SimpleNamespace(track="as given", variant=Variant(())),
+        found=None,
     )
     return search.Search(base, lambda line: None)
 

@@ -52,6 +52,15 @@ class Start:
         """The effect with values from the coefficients of the columns."""
         return Term(self.effect, self.combine(coefficients), self.free)
 
+    def allows(self, coefficients: Array) -> bool:
+        """Whether coefficients lie on the allowed side of every parameter."""
+        if self.effect.seeds is None and len(coefficients) == len(self.free):
+            for c, name in zip(coefficients, self.free, strict=True):
+                p = self.effect.parameter(name)
+                if c < 0.0 and p.neutral in (p.low, p.high):
+                    return False
+        return not (coefficients < self.least).any()
+
 
 @dataclass
 class Candidates:

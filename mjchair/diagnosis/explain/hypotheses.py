@@ -63,7 +63,11 @@ def weigh(reduced: Reduced, starts: Sequence[Start]) -> Hypothesis:
     block = reduced.G[np.ix_(which, which)]
     if (np.diag(block) < 1e-8).any():
         return Hypothesis(tuple(starts), 0.0, -np.inf)
-    gain = reduced.gain(which)
+    return priced(starts, reduced.gain(which))
+
+
+def priced(starts: Sequence[Start], gain: float) -> Hypothesis:
+    """The hypothesis with this gain (chi2), its score less what its parameters must bring."""
     free = sum(len(s.free) for s in starts)
     weighed = Hypothesis(tuple(starts), gain, gain - PENALTY * free)
     return replace(weighed, score=weighed.score + weighed.prior)
@@ -72,15 +76,7 @@ def weigh(reduced: Reduced, starts: Sequence[Start]) -> Hypothesis:
 def physical(reduced: Reduced, hypothesis: Hypothesis) -> bool:
     """Whether the linear coefficients lie on the allowed side of every parameter."""
     coefficients = reduced.solve(reduced.index(hypothesis.columns))
-    for start, mine in _split(hypothesis, coefficients):
-        if start.effect.seeds is None and len(mine) == len(start.free):
-            for c, name in zip(mine, start.free, strict=True):
-                p = start.effect.parameter(name)
-                if c < 0.0 and p.neutral in (p.low, p.high):
-                    return False
-        if (mine < start.least).any():
-            return False
-    return True
+    return all(start.allows(mine) for start, mine in _split(hypothesis, coefficients))
 
 
 def _split(hypothesis: Hypothesis, coefficients: Array) -> list[tuple[Start, Array]]:

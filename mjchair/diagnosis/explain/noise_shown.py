@@ -55,23 +55,30 @@ def with_shown_noise(
         for part, level in shaking.levels.items()
     }
     columns = {**nuisances, **_smooth(bench, first, pulses, answers), **_sensors(bench, first)}
-    return _estimated(bench, first, replace(shaking, levels=parts), columns)
+    return _estimated(bench, first, replace(shaking, levels=parts), columns)[0]
 
 
-def with_noise_left_by(
-    bench: Bench, here: Track, nuisances: dict[ColumnId, Column], best: dict[ColumnId, Column]
-) -> Bench:
-    """The bench with the noise that the best hypothesis leaves.
+def left_by(
+    bench: Bench,
+    here: Track,
+    nuisances: dict[ColumnId, Column],
+    best: dict[ColumnId, Column],
+    given: bool = False,
+) -> tuple[Bench, float]:
+    """The bench with the noise that a hypothesis leaves, and its deviance.
+
+    The deviance (`noise_levels.deviance`) compares hypotheses that were looked at with one bench.
 
     Where few windows tell a smooth force, it takes a part of the noise for itself; what the best
     effects do not explain, and what no force explains alike in all windows, is noise as well.
 
     Args:
-      best: columns of the best hypothesis, in sizes worth finding.
+      best: columns of the hypothesis, in sizes worth finding. given: see
+        `noise_levels.least_powers`.
     """
     assert bench.process is not None
     broad = {key: [SIZES * window for window in column] for key, column in best.items()}
-    return _estimated(bench, here, bench.process, {**nuisances, **broad})
+    return _estimated(bench, here, bench.process, {**nuisances, **broad}, given)
 
 
 def loudness(bench: Bench) -> float:
@@ -93,9 +100,13 @@ def hushed(bench: Bench) -> Bench:
 
 
 def _estimated(
-    bench: Bench, here: Track, shaking: Process, columns: dict[ColumnId, Column]
-) -> Bench:
-    """The bench with the most probable levels, with the columns fitted along."""
+    bench: Bench,
+    here: Track,
+    shaking: Process,
+    columns: dict[ColumnId, Column],
+    given: bool = False,
+) -> tuple[Bench, float]:
+    """The bench with the most probable levels, with the columns fitted along; the deviance."""
     simulator = bench.simulator
     windows = noise_levels.windows_of(
         simulator, here, bench.whitener, shaking, columns, bench.windows
@@ -105,18 +116,15 @@ def _estimated(
         wobbles=shaking.wobbles,
         bands=np.ones((len(simulator.channels), len(EDGES))),
     )
-    least = noise_levels.least_powers(bench.noise, simulator.channels)
+    least = noise_levels.least_powers(bench.noise, simulator.channels, given)
     fixed = frozenset(noise_levels.known_parts(simulator.study))
     most = _most(simulator)
     shown = noise_levels.estimate(windows, begin, least, fixed, most=most)
+    how_far = noise_levels.deviance(windows, shown)
     shown = replace(shown, bands=shown.bands * _doubled(bench)[:, None])
     noise = noise_levels.with_levels(bench.noise, simulator.channels, _steps(bench), shown)
-    return Bench(
-        simulator,
-        noise,
-        bench.nuisances,
-        replace(shaking, levels=shown.parts, wobbles=shown.wobbles),
-    )
+    process = replace(shaking, levels=shown.parts, wobbles=shown.wobbles)
+    return Bench(simulator, noise, bench.nuisances, process), how_far
 
 
 def _most(simulator: WindowSimulator) -> dict[Force, float]:

@@ -44,6 +44,14 @@ QUIETER = 0.25  # of the power of what shakes the chair: an explanation that lea
 AT_REST = 0.01  # m/s^2, bias of an accelerometer that was seen at rest
 
 
+@dataclass(frozen=True)
+class Found:
+    """Effects that were found before the search, with their fit."""
+
+    starts: tuple[Start, ...]
+    fitted: Fitted
+
+
 @dataclass(kw_only=True)
 class Base:
     """A chair without any effect, and every column around it.
@@ -54,6 +62,7 @@ class Base:
       nuisances: their columns. columns: of effects and forces. starts: what the effects' columns
         mean. dropped: a line for each effect that could not be tried.
       system, reduced: the linear algebra of them all.
+      found: effects without which they passed for noise; None: noise hides none.
     """
 
     bench: Bench
@@ -65,6 +74,7 @@ class Base:
     dropped: list[str]
     system: System
     reduced: Reduced
+    found: Found | None = None
 
 
 def silent(_: str) -> None:
@@ -141,6 +151,11 @@ def _with_noise_left(base: Base) -> Base:
         other = _noise_left(base, hushed, _reduced_anew(_on(base, hushed)).reduced)
         if noise_shown.loudness(other) < QUIETER * noise_shown.loudness(bench):
             bench = other
+    return with_noise(base, bench)
+
+
+def with_noise(base: Base, bench: Bench) -> Base:
+    """The base with the noise of another bench: the best chair without effects, and all columns."""
     plain = refit(bench, base.plain.variant, base.plain.track, base.plain.columns)
     return _reduced_anew(replace(_on(base, bench), plain=plain))
 
@@ -170,7 +185,7 @@ def _noise_left(base: Base, bench: Bench, reduced: Reduced) -> Bench:
             own = {c: column for c, column in fitted.columns.items() if c not in base.nuisances}
         except (MjchairError, np.linalg.LinAlgError):
             pass  # these effects this chair cannot have: linear algebra must do
-    return noise_shown.with_noise_left_by(base.bench, here, base.nuisances, own)
+    return noise_shown.left_by(base.bench, here, base.nuisances, own)[0]
 
 
 def _reduced_anew(base: Base) -> Base:

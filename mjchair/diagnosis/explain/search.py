@@ -6,7 +6,7 @@ rules that decide stand in rules.py; a hypothesis that this chair cannot have is
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
 
@@ -19,10 +19,11 @@ from mjchair.diagnosis.explain.choice import Choice, Rival
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.left_out import held_out, with_terms
+from mjchair.diagnosis.explain.near_fit import near_fit
 from mjchair.diagnosis.explain.screening import Base, Say, gap_after
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
-from mjchair.diagnosis.fit.variant import Variant
+from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.replay.window_states import Track
 from mjchair.errors import MjchairError
 
@@ -45,12 +46,36 @@ class Tried(Rival):
         return self.fitted.total + penalty
 
 
-def choose(base: Base, gap: Gap, say: Say) -> Choice | None:
-    """Grow from one effect to as many as the data ask for; None: no effect brings anything."""
-    search = Search(base, say)
+def choose(base: Base, gap: Gap, say: Say, search: Search | None = None) -> Choice | None:
+    """Grow from one effect to as many as the data ask for; None: no effect brings anything.
+
+    Args:
+      search: around the base, with fits that were made already; None: none were.
+    """
+    search = search or Search(base, say)
+    best, after = search.found() if base.found else _grown(search)
+    if best is None:
+        return None
+    best, rivals = search.against_rivals(search.without_needless(best))
+    say("the last fit, with everything made anew around it")
+    fitted = search.anew(best)
+    after[-1] = gap_after(base, fitted)
+    return Choice(
+        hypothesis=best.hypothesis,
+        fitted=fitted,
+        after=after,
+        rivals=rivals,
+        tried=search.tried,
+        dropped=search.dropped,
+    )
+
+
+def _grown(search: Search) -> tuple[Tried | None, list[Gap]]:
+    """The best hypothesis, grown effect by effect, and the gap that is left with one, two, ..."""
+    base = search.base
     options = [hypotheses.singles(base.reduced, base.starts)]
     if not options[0] or options[0][0].score <= 0.0:
-        return None
+        return None, []
     options.append(hypotheses.pairs(base.reduced, base.starts))
     best: Tried | None = None
     after: list[Gap] = []
@@ -73,20 +98,7 @@ def choose(base: Base, gap: Gap, say: Say) -> Choice | None:
         after.append(left)
         if not left.exists:
             break
-    if best is None:
-        return None
-    best, rivals = search.against_rivals(search.without_needless(best))
-    say("the last fit, with everything made anew around it")
-    fitted = search.anew(best)
-    after[-1] = gap_after(base, fitted)
-    return Choice(
-        hypothesis=best.hypothesis,
-        fitted=fitted,
-        after=after,
-        rivals=rivals,
-        tried=search.tried,
-        dropped=search.dropped,
-    )
+    return best, after
 
 
 class Search:
@@ -105,6 +117,40 @@ class Search:
         self.tried: list[Rival] = []
         self.impossible: list[tuple[Start, ...]] = []
         self.again: list[Rival] = []
+        self.near = near_fit(base, base.found) if base.found else None
+
+    def best_single(self) -> Hypothesis | None:
+        """The effect with which the search begins; None: none brings anything."""
+        options = hypotheses.singles(self.base.reduced, self.base.starts)
+        return _commonest(self, options) if options and options[0].score > 0.0 else None
+
+    def found(self) -> tuple[Tried, list[Gap]]:
+        """The effects that were found before the search, and what stands beside them; the gaps."""
+        known = self.base.found
+        assert known is not None
+        best = Tried(self.weigh(known.starts), known.fitted)
+        self.tried.append(best)
+        after = [gap_after(self.base, best.fitted)]
+        while after[-1].exists and len(best.hypothesis.starts) < rules.MOST:
+            options = _with_one_more(self, best.hypothesis.starts)
+            top = self.best_of(options, patient=False) if options else None
+            if top is None or not self.is_worth(best, top[0]):
+                break
+            best = top[0]
+            after.append(top[1])
+        return best, after
+
+    def weigh(self, starts: Sequence[Start]) -> Hypothesis:
+        """The hypothesis by linear algebra: around the effects that were found, if any."""
+        if self.near is not None:
+            return self.near.weigh(starts)
+        return hypotheses.weigh(self.base.reduced, starts)
+
+    def is_physical(self, hypothesis: Hypothesis) -> bool:
+        """Whether its linear coefficients are of such effects."""
+        if self.near is not None:
+            return self.near.physical(hypothesis.starts)
+        return hypotheses.physical(self.base.reduced, hypothesis)
 
     def best_of(
         self, options: Sequence[Hypothesis], patient: bool = True
@@ -116,7 +162,7 @@ class Search:
         Args:
           patient: whether, where none of these can be, the list is gone on along.
         """
-        first = _commonest(self.base, options)
+        first = _commonest(self, options)
         top = self.believed(first)
         if top is not None:
             left = gap_after(self.base, top.fitted)
@@ -168,7 +214,7 @@ class Search:
         fitted = self.anew(tried)
         for start in hypothesis.starts:
             rest = [s for s in hypothesis.starts if s is not start]
-            fewer = hypotheses.weigh(self.base.reduced, rest)
+            fewer = self.weigh(rest)
             parameters = hypothesis.free - fewer.free
             if rules.surely_needed(
                 sigmas=fitted.sigmas[start.effect.key],
@@ -210,7 +256,7 @@ class Search:
         out = []
         for start in hypothesis.starts:
             others = tuple(s for s in hypothesis.starts if s is not start)
-            near = [h for h in _replacements(self.base, start, others) if _close(hypothesis, h)]
+            near = [h for h in _replacements(self, start, others) if _close(hypothesis, h)]
             tried = [self.fit(h, chosen) for h in near[:most]]
             out.append(
                 [
@@ -251,7 +297,8 @@ class Search:
         """
         first = self._from(hypothesis, 1.0, best)
         promised = self.base.reduced.total - hypothesis.gain
-        beside = len(hypothesis.starts) > 1 and best is not None  # one of many: one start is enough
+        # one of many, or near a fit: one start is enough
+        beside = (len(hypothesis.starts) > 1 and best is not None) or self.near is not None
         short = first is None or rules.fell_short(
             total=first.total, promised=promised, gain=hypothesis.gain
         )
@@ -278,11 +325,7 @@ class Search:
         if part is None or (fitted is not None and fitted.total <= part.total):
             return fitted
         taken = {term.effect.key for term in part.variant.terms}
-        more = [
-            term
-            for term in hypotheses.terms(self.base.reduced, hypothesis)
-            if term.effect.key not in taken
-        ]
+        more = [t for t in self._terms(hypothesis) if t.effect.key not in taken]
         start = replace(part.variant, terms=(*part.variant.terms, *more))
         fits = [f for f in (fitted, self._made_anew(start, part.track)) if f is not None]
         return min(fits, key=lambda f: f.total, default=None)
@@ -299,9 +342,17 @@ class Search:
                 continue
         return min(totals, key=totals.__getitem__, default=None)
 
+    def _terms(self, hypothesis: Hypothesis) -> tuple[Term, ...]:
+        """The effects with the values that linear algebra promises."""
+        if self.near is not None:
+            return self.near.terms(hypothesis.starts)
+        return hypotheses.terms(self.base.reduced, hypothesis)
+
     def _refit(self, hypothesis: Hypothesis, share: float, rounds: int = ROUNDS) -> Fitted:
         """The nonlinear fit that begins at a share of the linear fit's coefficients."""
         base = self.base
+        if self.near is not None:
+            return self.near.refit(hypothesis.starts, rounds)
         terms = hypotheses.terms(base.reduced, hypothesis, share)
         start = replace(base.around.variant, terms=terms)
         return refit(base.bench, start, base.around.track, base.nuisances, rounds)
@@ -384,25 +435,25 @@ def _believable(fitted: Fitted) -> bool:
     )
 
 
-def _commonest(base: Base, options: Sequence[Hypothesis]) -> Hypothesis:
+def _commonest(search: Search, options: Sequence[Hypothesis]) -> Hypothesis:
     """Of the hypotheses that fit alike, the one whose effects stand first in the library."""
-    order = {s.effect.key: k for k, s in reversed(list(enumerate(base.starts)))}
+    order = {s.effect.key: k for k, s in reversed(list(enumerate(search.base.starts)))}
     alike = [h for h in options if rules.alike(h.score, options[0].score)]
     best = min(alike, key=lambda h: sorted(order[k] for k in h.keys))
     for start in best.starts:
-        best = _freed(base, best, start)
+        best = _freed(search, best, start)
     return best
 
 
-def _freed(base: Base, hypothesis: Hypothesis, start: Start) -> Hypothesis:
+def _freed(search: Search, hypothesis: Hypothesis, start: Start) -> Hypothesis:
     """The hypothesis with more of an effect's parameters free, where others of them fit alike.
 
     A left drive 3 % weak and a right one 3 % strong differ by what the mass may be: then neither
     number alone has the uncertainty that it shows.
     """
     others = tuple(s for s in hypothesis.starts if s is not start)
-    same = [s for s in base.starts if s.group == start.group and s.effect.seeds is None]
-    weighed = {s.columns: hypotheses.weigh(base.reduced, (*others, s)) for s in same}
+    same = [s for s in search.base.starts if s.group == start.group and s.effect.seeds is None]
+    weighed = {s.columns: search.weigh((*others, s)) for s in same}
     alike = {
         column
         for columns, h in weighed.items()
@@ -437,19 +488,26 @@ def _not_ruled_out(rival: Tried, chosen: Tried, plain: float) -> bool:
     )
 
 
-def _replacements(base: Base, start: Start, others: tuple[Start, ...]) -> list[Hypothesis]:
+def _replacements(search: Search, start: Start, others: tuple[Start, ...]) -> list[Hypothesis]:
     """The others with another effect instead of `start`, best first."""
-    taken = {start.effect.key, *(s.effect.key for s in others)}
+    return _with_one_more(search, others, {start.effect.key})
+
+
+def _with_one_more(
+    search: Search, others: tuple[Start, ...], but: Collection[str] = ()
+) -> list[Hypothesis]:
+    """The others with each further effect, but for the effects of these keys; best first."""
+    taken = {*but, *(s.effect.key for s in others)}
     pool: dict[str, Hypothesis] = {}
-    for other in base.starts:
+    for other in search.base.starts:
         key = other.effect.key
         if key in taken:
             continue
-        replaced = hypotheses.weigh(base.reduced, (*others, other))
-        if not np.isfinite(replaced.score) or not hypotheses.physical(base.reduced, replaced):
+        more = search.weigh((*others, other))
+        if not np.isfinite(more.score) or not search.is_physical(more):
             continue
-        if key not in pool or replaced.score > pool[key].score:
-            pool[key] = replaced
+        if key not in pool or more.score > pool[key].score:
+            pool[key] = more
     return sorted(pool.values(), key=lambda h: -h.score)
 
 

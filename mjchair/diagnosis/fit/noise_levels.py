@@ -156,7 +156,7 @@ def estimate(
 
     Args:
       windows: that may be fitted to. first: where to begin.
-      least: (channels,), the least power of a sensor, over that of the first guess.
+      least: (channels, bands), the least power of a sensor, over that of the first guess.
       fixed: parts whose level is known. most: force -> the largest level of a part of it, N or
         N m; None: any. What shakes a chair harder is something missing.
     """
@@ -177,6 +177,29 @@ def _within(levels: Levels, most: Mapping[Force, float], fixed: frozenset[Part])
     bands = levels.bands.copy()
     bands[:, 0] = np.minimum(bands[:, 0], FLAT * bands[:, 1])
     return replace(levels, parts=parts, bands=bands)
+
+
+def deviance(windows: Sequence[WindowColumns], levels: Levels) -> float:
+    """-2 times the logarithm of the probability of the data, but for a constant.
+
+    All that is asked about is integrated over its prior, so that explanations with other columns
+    and with the levels that each of them leaves are compared: whether it is noise or effects.
+    """
+    count = windows[0].J.shape[1]
+    A, a, total = np.eye(count), np.zeros(count), 0.0
+    for w in windows:
+        power = levels.bands[w.channel, w.band]
+        size = 1.0 / np.sqrt(power)
+        columns = _noise_columns(w, levels) * size[:, None]
+        factor = cho_factor(np.eye(columns.shape[1]) + columns.T @ columns)
+        J, r = w.J * size[:, None], w.r * size
+        H = J - columns @ cho_solve(factor, columns.T @ J)
+        A += J.T @ H
+        a += H.T @ r
+        shown = columns.T @ r
+        total += float(r @ r - shown @ cho_solve(factor, shown) + np.log(power).sum())
+        total += 2.0 * float(np.log(np.diag(factor[0])).sum())
+    return total + float(np.linalg.slogdet(A)[1] - a @ np.linalg.solve(A, a))
 
 
 def _looked_at(windows: Sequence[WindowColumns], levels: Levels) -> Seen:
@@ -252,7 +275,7 @@ def _moved(levels: Levels, seen: Seen, least: Array, fixed: frozenset[Part]) -> 
     ratio = _ratio(seen.shown[BANDS], seen.due[BANDS]).reshape(shape)
     told = seen.due[BANDS].reshape(shape) > 1.0
     bands = np.where(told, levels.bands * ratio, levels.bands)
-    return Levels(parts=parts, wobbles=wobbles, bands=np.maximum(bands, least[:, None]))
+    return Levels(parts=parts, wobbles=wobbles, bands=np.maximum(bands, least))
 
 
 def _of_runs(level: Array, shown: Array, due: Array) -> Array:
@@ -300,15 +323,25 @@ def with_levels(
     return out
 
 
-def least_powers(noise: Mapping[str, Noise], channels: Sequence[str]) -> Array:
-    """The least power of each sensor, over that of the first guess, (channels,).
+def least_powers(noise: Mapping[str, Noise], channels: Sequence[str], given: bool = False) -> Array:
+    """The least power of each sensor, over that of the first guess, (channels, bands).
 
     What study.toml gives is not made smaller; no sensor is better than its kind can be.
+
+    Args:
+      given: whether, of a sensor that study.toml gives, an earlier look that saw more than what is
+        given may have been wrong.
     """
+    middle = 0.5 * (np.r_[0.0, EDGES[:-1]] + np.array(EDGES))
     out = []
     for c in channels:
-        given = noise[c].source == "study.toml"
-        out.append(1.0 if given else min(1.0, (sensor(c).floor / noise[c].total) ** 2))
+        known = noise[c]
+        if known.source != "study.toml":
+            out.append(np.full(middle.size, min(1.0, (sensor(c).floor / known.total) ** 2)))
+        elif known.bands and given:
+            out.append(known.white**2 / known.power(middle, 1.0))
+        else:
+            out.append(np.ones(middle.size))
     return np.array(out)
 
 

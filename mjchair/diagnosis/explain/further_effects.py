@@ -1,0 +1,183 @@
+"""Whether what seems to shake the chair is noise, or further effects beside the best.
+
+In: a search around a screened base. Out: a search with the noise that an explanation by several
+effects leaves, and with this explanation, where it is the more probable one; else the search as it
+was.
+
+The noise was taken around the best effects by linear algebra. Where several effects are there at
+once, those that are not among these pass for noise, which then hides them. So the best effect is
+fitted with every column made anew around it, and the next ones are sought around this fit for a
+chair that is hardly shaken. Noise and effects are compared by the probability that they give to the
+data (`noise_levels.deviance`): an effect must earn what it takes from the noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from operator import attrgetter
+
+import numpy as np
+
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import hypotheses, noise_shown
+from mjchair.diagnosis.explain.candidates import Start
+from mjchair.diagnosis.explain.hypotheses import Hypothesis
+from mjchair.diagnosis.explain.screening import LOUD, Base, Found, with_noise
+from mjchair.diagnosis.explain.search import Search
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.bench import Bench
+from mjchair.diagnosis.fit.bounded import Reduced
+from mjchair.diagnosis.fit.column_ids import ColumnId
+from mjchair.diagnosis.fit.nonlinear import Fitted, refit
+from mjchair.diagnosis.replay.derivatives import Column
+from mjchair.errors import MjchairError
+
+HALF = 0.5  # of the power of what shakes the chair: effects that take less are no matter of noise
+PROMISED = 0.7  # of that power: what linear algebra leaves at most of it
+LOOKED = 3  # further single effects, and pairs, that are weighed against noise
+ROUNDS = 4  # of fit and noise, at most
+SETTLED = 5.0  # deviance that a further round changes no more
+LINEAR = 0.1  # share of what effects earn by which linear algebra may be wrong
+
+
+@dataclass(frozen=True, kw_only=True)
+class Explained:
+    """Effects, their fit, the noise that they leave, and its deviance with their penalties."""
+
+    starts: tuple[Start, ...]
+    fitted: Fitted
+    bench: Bench
+    price: float
+
+
+def without_hidden(search: Search) -> Search:
+    """The search, or one with the noise that further effects leave, where these earn it.
+
+    Args:
+      search: that nothing was asked yet; the fits that are made here stay in it.
+    """
+    base = search.base
+    if noise_shown.loudness(base.bench) <= LOUD:
+        return search
+    search.say("what passes for noise")
+    first = here = _first(search)
+    while len(here.starts) < rules.MOST and noise_shown.loudness(here.bench) > LOUD:
+        further = _further(base, here)
+        if further is None:
+            break
+        here = further
+    if here is first:
+        return search
+    quieter = with_noise(base, here.bench)
+    columns = {c: here.fitted.columns[c] for c in base.nuisances}
+    fitted = refit(here.bench, here.fitted.variant, here.fitted.track, columns)
+    return Search(replace(quieter, found=Found(here.starts, fitted)), search.say)
+
+
+def _first(search: Search) -> Explained:
+    """The best effect with everything made anew around it, or none where it earns nothing."""
+    base = search.base
+    plain = _left(base, (), base.plain)
+    best = search.best_single()
+    if best is None or best.gain < rules.needed(best.free):
+        return plain
+    tried = search.fit(best)
+    if tried is None:
+        return plain
+    alone = _left(base, best.starts, search.anew(tried))
+    return alone if alone.price < plain.price else plain
+
+
+def _further(base: Base, here: Explained) -> Explained | None:
+    """One or two more effects that are more probable than the noise that they take; None: none."""
+    reduced = _around(base, noise_shown.hushed(here.bench), here.fitted)
+    near = [_fitted(base, here, b, h, reduced) for h, b in _promising(base, here, reduced)]
+    best = min((e for e in near if e is not None), key=attrgetter("price"), default=here)
+    if best.price >= here.price:
+        return None
+    best = _agreed(base, best)
+    quiet = HALF * noise_shown.loudness(here.bench)
+    return best if noise_shown.loudness(best.bench) < quiet else None
+
+
+def _promising(base: Base, here: Explained, reduced: Reduced) -> list[tuple[Hypothesis, Bench]]:
+    """The further effects that are worth a fit: by linear algebra they leave less and earn it.
+
+    Each with the noise that it leaves.
+    """
+    taken = {s.effect.key for s in here.starts}
+    free = [s for s in base.starts if s.effect.key not in taken]
+    options = hypotheses.singles(reduced, free)[:LOOKED]
+    if len(here.starts) + 2 <= rules.MOST:
+        options += hypotheses.pairs(reduced, free)[:LOOKED]
+    own = _own(base, here.fitted)
+    weighed = []
+    for h in options:
+        columns: dict[ColumnId, Column] = {**own, **{c: base.columns[c] for c in h.columns}}
+        bench, deviance = _noise(base, here.fitted, columns)
+        if noise_shown.loudness(bench) < PROMISED * noise_shown.loudness(here.bench):
+            weighed.append((here.price - deviance - _penalty((*here.starts, *h.starts)), h, bench))
+    most = max((earns for earns, *_ in weighed), default=0.0)
+    return [(h, b) for earns, h, b in weighed if earns > 0.0 and earns > (1.0 - LINEAR) * most]
+
+
+def _fitted(
+    base: Base, here: Explained, bench: Bench, more: Hypothesis, reduced: Reduced
+) -> Explained | None:
+    """The explanation with more effects; None: no chair can be so.
+
+    Args:
+      bench: to fit with. reduced: linear algebra around `here`, which tells where to begin.
+    """
+    terms = (*here.fitted.variant.terms, *hypotheses.terms(reduced, more))
+    columns = {c: here.fitted.columns[c] for c in base.nuisances}
+    try:
+        start = replace(here.fitted.variant, terms=terms)
+        fitted = refit(bench, start, here.fitted.track, columns)
+    except (MjchairError, np.linalg.LinAlgError):
+        return None
+    return _left(base, (*here.starts, *more.starts), fitted)
+
+
+def _agreed(base: Base, one: Explained) -> Explained:
+    """The explanation once its fit and the noise that it leaves agree."""
+    for _ in range(ROUNDS):
+        columns = {c: one.fitted.columns[c] for c in base.nuisances}
+        fitted = refit(one.bench, one.fitted.variant, one.fitted.track, columns)
+        more = _left(base, one.starts, fitted)
+        if more.price > one.price - SETTLED:
+            break
+        one = more
+    return one
+
+
+def _left(base: Base, starts: tuple[Start, ...], fitted: Fitted) -> Explained:
+    """The explanation with the noise that its fit leaves."""
+    bench, deviance = _noise(base, fitted, _own(base, fitted))
+    return Explained(starts=starts, fitted=fitted, bench=bench, price=deviance + _penalty(starts))
+
+
+def _noise(base: Base, fitted: Fitted, own: dict[ColumnId, Column]) -> tuple[Bench, float]:
+    nuisances = {c: fitted.columns[c] for c in base.nuisances}
+    return noise_shown.left_by(base.bench, fitted.track, nuisances, own, given=True)
+
+
+def _own(base: Base, fitted: Fitted) -> dict[ColumnId, Column]:
+    """The columns of the effects that are in."""
+    return {c: column for c, column in fitted.columns.items() if c not in base.nuisances}
+
+
+def _around(base: Base, bench: Bench, fitted: Fitted) -> Reduced:
+    """The linear algebra of all columns around a fit whose effects are free."""
+    count = len(fitted.columns)
+    columns = {**fitted.columns, **base.columns}
+    free = count - len(base.nuisances)
+    system = bench.system(fitted.track, columns, count, fitted.variant, free=free)
+    return bounded.reduce(system, bench.windows)
+
+
+def _penalty(starts: Sequence[Start]) -> float:
+    """What effects must earn: chi2 of their parameters, less for effects that are common."""
+    prior = Hypothesis(tuple(starts), 0.0, 0.0).prior
+    return sum(rules.needed(len(s.free)) for s in starts) - prior

@@ -1,0 +1,121 @@
+"""Hypotheses around a fit of several effects, on a linear problem whose answer least squares knows;
+and whether what shakes a chair is noise or further effects, by prices that are told."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mjchair.diagnosis.explain import further_effects
+from mjchair.diagnosis.explain.candidates import Start
+from mjchair.diagnosis.explain.column_ids import EffectColumn, EffectGroup
+from mjchair.diagnosis.explain.near_fit import NearFit
+from mjchair.diagnosis.explain.screening import LOUD, Found
+from mjchair.diagnosis.fit.bounded import Sums
+from mjchair.diagnosis.fit.column_ids import ParameterId
+from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.effects.effect import Effect, Parameter
+
+ROWS = 60
+FITTED = {"one": 2.0, "two": 3.0}  # a fit that is not the best
+
+
+def start(name):
+    effect = Effect(
+        name=name,
+        parameters=(Parameter("size", "N", 1.0, -100.0, 100.0),),
+        signature="",
+        source="",
+        edit=lambda spec, size: None,
+    )
+    group = EffectGroup(name, 0)
+    return Start(
+        effect=effect,
+        group=group,
+        columns=(EffectColumn(group, 0),),
+        combine=lambda c: {"size": float(c[0])},
+        free=("size",),
+    )
+
+
+@pytest.fixture
+def problem():
+    """Starts, their columns (ROWS,) by name, what was measured, and the linear algebra."""
+    rng = np.random.default_rng(0)
+    starts = {name: start(name) for name in ("one", "two", "three")}
+    J = {name: rng.standard_normal(ROWS) for name in starts}
+    y = 1.0 * J["one"] + 4.0 * J["three"] + 0.1 * rng.standard_normal(ROWS)
+    ids = [ParameterId(name, "size") for name in FITTED]
+    ids += [s.columns[0] for s in starts.values()]
+    columns = np.column_stack([*(J[name] for name in FITTED), *J.values()])
+    r = y - sum(size * J[name] for name, size in FITTED.items())
+    reduced = Sums(
+        columns=ids, count=0, G=columns.T @ columns, b=columns.T @ r, c=float(r @ r),
+        back=np.zeros(0), precision=np.zeros(0), wall=np.zeros(0),
+    ).plain()  # fmt: skip
+    terms = tuple(Term(starts[n].effect, {"size": v}, ("size",)) for n, v in FITTED.items())
+    found = Found(
+        tuple(starts[n] for n in FITTED), SimpleNamespace(variant=Variant((), terms=terms))
+    )
+    base = SimpleNamespace(reduced=SimpleNamespace(total=float(y @ y)))
+    return starts, J, y, NearFit(base=base, found=found, reduced=reduced)
+
+
+@pytest.mark.parametrize("names", [("one",), ("one", "two"), ("one", "three"), ("three",)])
+def test_a_hypothesis_gains_what_least_squares_gains(problem, names):
+    starts, J, y, near = problem
+    columns = np.column_stack([J[n] for n in names])
+    best, *_ = np.linalg.lstsq(columns, y, rcond=None)
+    left = y - columns @ best
+    gain = near.weigh([starts[n] for n in names]).gain
+    assert gain == pytest.approx(float(y @ y - left @ left), rel=1e-6)
+
+
+def test_what_is_new_begins_at_its_linear_value_and_the_rest_stays(problem):
+    starts, J, y, near = problem
+    terms = near.terms([starts["one"], starts["three"]])
+    best, *_ = np.linalg.lstsq(np.column_stack([J["one"], J["three"]]), y, rcond=None)
+    assert terms[0].values["size"] == FITTED["one"]
+    assert terms[1].values["size"] == pytest.approx(best[1], rel=1e-6)
+
+
+def explained(count, power, price):
+    fitted = SimpleNamespace(variant=None, track=None, columns={})
+    return SimpleNamespace(
+        starts=("effect",) * count, fitted=fitted, bench=SimpleNamespace(power=power), price=price
+    )
+
+
+@pytest.mark.parametrize(
+    ("power", "price", "quieter"),
+    [
+        (0.2, 90.0, True),  # the effects earn it, and leave far less noise
+        (0.2, 110.0, False),  # less noise, but noise is the more probable
+        (0.9, 90.0, False),  # more probable, but noise was not what hid them
+    ],
+)
+def test_noise_gives_way_to_effects_that_earn_it(monkeypatch, power, price, quieter):
+    one, more = explained(1, 1.0, 100.0), explained(3, power, price)
+    monkeypatch.setattr(further_effects.noise_shown, "loudness", lambda bench: bench.power)
+    monkeypatch.setattr(further_effects.noise_shown, "hushed", lambda bench: bench)
+    monkeypatch.setattr(further_effects, "_first", lambda _: one)
+    monkeypatch.setattr(further_effects, "_around", lambda *_: None)
+    monkeypatch.setattr(further_effects, "_promising", lambda *_: [(None, None)])
+    monkeypatch.setattr(further_effects, "_fitted", lambda *_: more)
+    monkeypatch.setattr(further_effects, "_agreed", lambda _, best: best)
+    monkeypatch.setattr(further_effects, "refit", lambda *_: "the fit")
+    monkeypatch.setattr(further_effects, "replace", lambda base, found: found)
+    monkeypatch.setattr(further_effects, "with_noise", lambda base, bench: bench)
+    monkeypatch.setattr(further_effects, "Search", lambda found, _: found)
+    base = SimpleNamespace(bench=SimpleNamespace(power=1.0), nuisances={})
+    search = SimpleNamespace(base=base, say=lambda _: None)
+    found = further_effects.without_hidden(search)
+    assert (found is not search) == quieter
+    if quieter:
+        assert found.starts == more.starts
+
+
+def test_a_chair_that_is_hardly_shaken_is_not_looked_at_again(monkeypatch):
+    monkeypatch.setattr(further_effects.noise_shown, "loudness", lambda bench: bench)
+    search = SimpleNamespace(base=SimpleNamespace(bench=0.5 * LOUD))
+    assert further_effects.without_hidden(search) is search
