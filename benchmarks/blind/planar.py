@@ -211,13 +211,18 @@ def rates(t, s, p, waves, joints, grid_step, torque, noise):
     d[20] = s[21]
     d[21] = (flex_moment - p[K_FLEX] * s[20] - p[C_FLEX] * s[21]) / 1.5
     # what else pushes the chair
-    weight = m * GRAVITY
-    fx_sum += weight * (-p[SLOPE_X] * cos - p[SLOPE_Y] * sin)
-    fy_sum += weight * (p[SLOPE_X] * sin - p[SLOPE_Y] * cos)
+    weight = m * GRAVITY  # at the centre of mass: a cross slope turns the chair downhill
+    down_x = weight * (-p[SLOPE_X] * cos - p[SLOPE_Y] * sin)
+    down_y = weight * (p[SLOPE_X] * sin - p[SLOPE_Y] * cos)
+    fx_sum += down_x
+    fy_sum += down_y
+    mz_sum += p[COM_X] * down_y - p[COM_Y] * down_x
     wx, wy = u * cos - v * sin - p[WIND_X], u * sin + v * cos - p[WIND_Y]
     air = -0.6 * p[DRAG] * np.hypot(wx, wy)
+    across = air * (-sin * wx + cos * wy)
     fx_sum += air * (cos * wx + sin * wy)
-    fy_sum += air * (-sin * wx + cos * wy)
+    fy_sum += across
+    mz_sum += p[COM_X] * across  # of a seated person, the middle of whose area is near that of mass
     fx_sum += p[SWAY] * np.sin(p[SWAY_RATE] * t + p[SWAY_PHASE])
     mz_sum -= p[SCRUB] * np.tanh(r / 0.05)
     catch = 0.5 * (1.0 + np.tanh((abs(u) - 1.15) / 0.02)) * np.sign(u) * p[STRAP]
