@@ -2,9 +2,9 @@
 
 What it does: takes the lines of `calibration_draws.py`, finds the temper under which what was
 hidden is most probable, and by isotonic regression (scikit-learn) how often a chosen hypothesis was
-right at the odds that the tempered evidence gives. Prints reliability on base studies that the fit
-did not see, each fifth of them in turn, and of the real studies of `calibration_studies.py`, where
-these are there. In: the folder of draws.jsonl. Out: with --write,
+right at the odds that the tempered evidence gives, or at its standard errors. Prints reliability on
+base studies that the fit did not see, each fifth of them in turn, and of the real studies of
+`calibration_studies.py`, where these are there. In: the folder of draws.jsonl. Out: with --write,
 mjchair/diagnosis/explain/calibration.toml.
 
     python benchmarks/calibration.py out/calibration --write
@@ -42,7 +42,7 @@ from mjchair.diagnosis.explain.calibration import (
     holds,
     kind,
     log_odds,
-    tried,
+    spoken,
 )
 
 Array = NDArray[np.float64]
@@ -57,7 +57,7 @@ GROUP = 20  # studies that are alike for the isotonic regression
 FAR = 1000.0  # log-odds beyond which all are alike
 ONES = tuple(np.r_[-FAR, np.linspace(-30.0, 30.0, 121), FAR])
 BANDS = (0.0, 0.5, 0.7, 0.9, 0.95, 0.99, 1.0)
-EVEN = Line(odds=ONES, right=tuple(expit(ONES)))
+EVEN = Line(values=ONES, right=tuple(expit(ONES)))
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,9 @@ def _drawn(line: dict[str, Any]) -> Drawn:
     if line["chosen"]:
         rivals = line["rivals"]  # a count, or the names for each effect
         there = any(rivals) if isinstance(rivals, list) else rivals > 0
-        chosen = Chosen(line["chosen"], line["gap_left"], there)
+        sigmas = line["sigmas"]  # the least, or of each effect
+        least = min(sigmas.values()) if isinstance(sigmas, dict) else sigmas
+        chosen = Chosen(line["chosen"], line["gap_left"], there, least)
     return Drawn(
         study=line["study"],
         truth=line["truth"] if "truth" in line else _truth(line["answer"]),
@@ -123,11 +125,10 @@ def fit(studies: Sequence[Drawn], made: str = "") -> Calibration:
     for study in studies:
         logs = raw.tempered(study.weights, study.chosen)
         name = about(study, logs)
-        heard = tried(logs, study.weights, study.chosen)
-        odds = float(np.clip(log_odds(heard, name), -FAR, FAR))
+        value = float(np.clip(spoken(logs, study.weights, study.chosen, name), -FAR, FAR))
         there = holds(study.truth, name)
         if name != OUTSIDE:
-            kinds[kind(name, study.chosen)].append((odds, there))
+            kinds[kind(name, study.chosen)].append((value, there))
         if not there or name == OUTSIDE:
             others = {n: v for n, v in logs.items() if n == OUTSIDE or not holds(n, name)}
             odds = float(np.clip(log_odds(others, OUTSIDE), -FAR, FAR))
@@ -159,7 +160,7 @@ def _line(pairs: Sequence[tuple[float, bool]]) -> Line:
     A step of n studies of which k were right stands at (k + 1) / (n + 2), also of none.
     """
     if not pairs:
-        return Line(odds=(-FAR, FAR), right=(0.5, 0.5))
+        return Line(values=(-FAR, FAR), right=(0.5, 0.5))
     odds, right = np.array(sorted(pairs), float).T
     groups = np.array_split(np.arange(odds.size), max(odds.size // GROUP, 1))
     shares = IsotonicRegression().fit_transform(
@@ -179,7 +180,7 @@ def _line(pairs: Sequence[tuple[float, bool]]) -> Line:
             points[round(float(at), 3)] = round(float(value), 4)
     if len(points) == 1:
         points[next(iter(points)) + 1.0] = next(iter(points.values()))
-    return Line(odds=tuple(points), right=tuple(points.values()))
+    return Line(values=tuple(points), right=tuple(points.values()))
 
 
 def folds(studies: Sequence[Drawn]) -> Iterable[tuple[Calibration, list[Drawn]]]:

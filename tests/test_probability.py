@@ -75,7 +75,10 @@ def base(size, alike=0.0, force=0.0):
 def fit(known, one):
     """One effect with its fit."""
     hypothesis = hypotheses.weigh(known.reduced, [one])
-    fitted = SimpleNamespace(total=known.plain.total - hypothesis.gain)
+    fitted = SimpleNamespace(
+        total=known.plain.total - hypothesis.gain,
+        sigmas={one.effect.name: math.sqrt(max(hypothesis.gain, 0.0))},
+    )
     return SimpleNamespace(hypothesis=hypothesis, fitted=fitted)
 
 
@@ -161,7 +164,9 @@ def weights(evidence):
 @pytest.mark.parametrize(("gap_left", "rivals"), [(False, False), (False, True), (True, False)])
 def test_more_evidence_never_makes_an_effect_less_probable(gap_left, rivals):
     known = [
-        calibration.shipped().probabilities(weights(e), Chosen("a", gap_left, rivals))
+        calibration.shipped().probabilities(
+            weights(e), Chosen("a", gap_left, rivals, math.sqrt(2.0 * max(e, 0.0)))
+        )
         for e in np.linspace(-20.0, 4000.0, 400)
     ]
     assert all(sum(k.values()) == pytest.approx(1.0) for k in known)
@@ -183,8 +188,8 @@ def test_an_effect_that_leaves_a_gap_is_less_sure():
     [
         ("temper = ", "temper = -", "must be at least 1"),
         ("temper = ", "tempre = ", "temper"),
-        ("right = [", "right = [2.0, ", "as many odds as shares"),
-        ("odds = [", "odds = [nan, ", "as many odds as shares"),
+        ("right = [", "right = [2.0, ", "as many values as shares"),
+        ("values = [", "values = [nan, ", "as many values as shares"),
         ("[effects]", "[effects", "not TOML"),
     ],
 )
@@ -211,7 +216,7 @@ def test_a_line_that_falls_is_refused(tmp_path):
 @pytest.mark.parametrize("of", calibration.LINES)
 def test_the_stored_lines_rise_and_promise_no_certainty(of):
     line = getattr(calibration.shipped(), of)
-    assert np.all(np.diff(line.odds) > 0.0) and np.all(np.diff(line.right) >= 0.0)
+    assert np.all(np.diff(line.values) > 0.0) and np.all(np.diff(line.right) >= 0.0)
     assert line.at(-1e3) > 0.0 and line.at(1e3) < 1.0
 
 
@@ -273,7 +278,7 @@ def test_probabilities_of_chosen_effects_come_true_as_often_as_they_say():
         if said["chosen"]:
             known = calibration.shipped().probabilities(
                 {n: Weight(*w) for n, w in said["weights"].items()},
-                Chosen(said["chosen"], said["gap_left"], said["rivals"] > 0),
+                Chosen(said["chosen"], said["gap_left"], said["rivals"] > 0, said["sigmas"]),
             )
             told.append(of_effects(known, said["chosen"].split("+")))
             right.append(calibration.holds(truth.name, said["chosen"]))

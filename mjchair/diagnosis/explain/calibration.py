@@ -6,7 +6,10 @@ which was chosen. What comes out: a probability of each. Two steps. Differences 
 divided by a temper, since no form of an effect is quite that of a real chair. Then the odds that
 the chosen effects are there are replaced by how often they were there in the cheap studies at such
 odds, a line that never falls (isotonic regression), with one line for choices that leave a gap and
-one for those that leave none. What is left of the probability goes to the other hypotheses.
+one for those with rivals. Effects that leave no gap and have no rival are read off by the standard
+errors of the least certain of them: there the rivals are ruled out, and how large an effect is told
+right from wrong as well as all odds together. What is left of the probability goes to the other
+hypotheses.
 """
 
 from __future__ import annotations
@@ -52,22 +55,27 @@ class Chosen:
 
     Attributes:
       name: of it. gap_left: whether it leaves a gap. rivals: whether something could stand in it.
+      sigmas: of the least certain effect, standard errors away from no effect.
     """
 
     name: str
     gap_left: bool = False
     rivals: bool = False
+    sigmas: float = math.inf
 
 
 class Line(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """How often a hypothesis was right (1) at log-odds (natural logarithm) as computed."""
+    """How often a hypothesis was right (1) at what spoke for it.
 
-    odds: tuple[float, ...]
+    That is log-odds (natural logarithm) as computed, or standard errors.
+    """
+
+    values: tuple[float, ...]
     right: tuple[float, ...]
 
-    def at(self, odds: float) -> float:
+    def at(self, value: float) -> float:
         """The share that was right, between and beyond the stored points as at the next."""
-        return float(np.interp(odds, self.odds, self.right))
+        return float(np.interp(value, self.values, self.right))
 
 
 class Calibration(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -76,9 +84,10 @@ class Calibration(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     Attributes:
       made, command: date, and how it is made again. studies: cheap studies that it was fitted to.
       temper: by which differences of evidence are divided.
-      effects: line of chosen effects that leave no gap and have no rival. rivalled: of those with
-        rivals. remainder: of those that leave a gap. unchosen: of the most probable effects where
-        the search chose none.
+      effects: line of chosen effects that leave no gap and have no rival, by the standard errors of
+        the least certain; all others go by odds. rivalled: of those with rivals.
+      remainder: of those that leave a gap. unchosen: of the most probable effects where the search
+        chose none.
       none: of nothing. alone: that no other effect is there, where the chosen effects are.
       outside: of a force outside the library, where they are not. next: of the most probable other
         hypothesis, where neither is there.
@@ -109,7 +118,7 @@ class Calibration(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         logs = self.tempered(weights, chosen)
         about = chosen.name if chosen else max(logs, key=lambda n: logs[n])
         line: Line = getattr(self, kind(about, chosen))
-        there = line.at(log_odds(tried(logs, weights, chosen), about))
+        there = line.at(spoken(logs, weights, chosen, about))
         out = self._with(logs, about, there) | self._without(logs, about, 1.0 - there)
         total = sum(out.values())  # below 1 where nothing else is known
         return {n: p / total for n, p in out.items()}
@@ -164,20 +173,22 @@ def kind(about: str, chosen: Chosen | None) -> str:
     return "rivalled" if chosen.rivals else "effects"
 
 
-def tried(
-    logs: Mapping[str, float], weights: Mapping[str, Weight], chosen: Chosen | None
-) -> dict[str, float]:
-    """The hypotheses that a choice is held against: those that were fitted; without one, all.
+def spoken(
+    logs: Mapping[str, float],
+    weights: Mapping[str, Weight],
+    chosen: Chosen | None,
+    about: str,
+) -> float:
+    """What speaks for a hypothesis on its line: log-odds, or standard errors.
 
-    How many others a linear promise brings near says more of how many there are than of the choice.
-    A force of any form fits whatever an effect fits: it speaks only where the choice leaves a gap.
+    A choice is held against those that were fitted: how many others a linear promise brings near
+    says more of how many there are than of the choice.
     """
     if chosen is None:
-        return dict(logs)
-    known = {n: v for n, v in logs.items() if weights[n].fitted}
-    if not chosen.gap_left:
-        known.pop(OUTSIDE, None)
-    return known
+        return log_odds(logs, about)
+    if kind(about, chosen) == "effects":
+        return chosen.sigmas
+    return log_odds({n: v for n, v in logs.items() if weights[n].fitted}, about)
 
 
 def holds(name: str, wanted: str) -> bool:
@@ -232,17 +243,17 @@ def read(path: Path) -> Calibration:
         line: Line = getattr(known, name)
         if not _monotone(line):
             raise MjchairError(
-                f"{path}: {name} must have as many odds as shares, each list rising, shares "
+                f"{path}: {name} must have as many values as shares, each list rising, shares "
                 f"between 0 and 1; {again}"
             )
     return known
 
 
 def _monotone(line: Line) -> bool:
-    odds, right = np.array(line.odds), np.array(line.right)
-    if odds.size < 2 or odds.size != right.size or not np.isfinite(odds).all():
+    values, right = np.array(line.values), np.array(line.right)
+    if values.size < 2 or values.size != right.size or not np.isfinite(values).all():
         return False
-    rises = bool((np.diff(odds) > 0.0).all() and (np.diff(right) >= 0.0).all())
+    rises = bool((np.diff(values) > 0.0).all() and (np.diff(right) >= 0.0).all())
     return rises and right[0] > 0.0 and right[-1] < 1.0
 
 

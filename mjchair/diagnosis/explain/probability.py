@@ -51,8 +51,12 @@ def chosen(choice: Choice | None) -> Chosen | None:
     """What the calibration asks about a choice."""
     if choice is None:
         return None
-    rivals = any(choice.rivals)
-    return Chosen(_name(choice.hypothesis), choice.after[-1].exists, rivals)
+    return Chosen(
+        name=_name(choice.hypothesis),
+        gap_left=choice.after[-1].exists,
+        rivals=any(choice.rivals),
+        sigmas=min(choice.fitted.sigmas.values()),
+    )
 
 
 def _name(h: Hypothesis) -> str:
