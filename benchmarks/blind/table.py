@@ -14,6 +14,7 @@ import numpy as np
 
 CLEAR = 12.0  # least sigmas reached by an effect that is counted as one of 15 sigma or more
 SHOWS = "15 sigma or more"
+FAINT = 5.0  # sigmas reached below which what is hidden counts as not there, as in the calibration
 OPEN = ("unknown", "ambiguous")
 ALIKE = 0.95  # |cos| beyond which two effects cannot be told apart
 
@@ -96,12 +97,15 @@ def _closed(lines: Sequence[dict]) -> str:
 
 
 def hypothesis(line: dict) -> frozenset[str]:
-    """What was hidden, as the keys of a hypothesis."""
+    """What was hidden and shows, as the keys of a hypothesis."""
     answer = line["answer"]
-    if not answer["hidden"] or answer["kind"] == "outside":
-        return frozenset([answer["kind"]])
+    shows = [n for n, size in answer["reached"].items() if size >= FAINT]
+    if not shows:
+        return frozenset(["none"])
+    if answer["kind"] == "outside":
+        return frozenset(["outside"])
     channel = answer["channel"]
-    return frozenset(f"{n}:{channel}" if channel else n for n in answer["hidden"])
+    return frozenset(f"{n}:{channel}" if channel else n for n in shows)
 
 
 def probable(line: dict) -> dict[frozenset[str], float]:
