@@ -23,7 +23,15 @@ from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import hypotheses, noise_shown
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
-from mjchair.diagnosis.explain.screening import LOUD, Base, Found, with_noise
+from mjchair.diagnosis.explain.screening import (
+    LOUD,
+    Base,
+    Found,
+    effects_of,
+    nuisances_of,
+    system_around,
+    with_noise,
+)
 from mjchair.diagnosis.explain.search import Search
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
@@ -70,7 +78,7 @@ def without_hidden(search: Search) -> Search:
     if here is first:
         return search
     quieter = with_noise(base, here.bench)
-    columns = {c: here.fitted.columns[c] for c in base.nuisances}
+    columns = nuisances_of(base, here.fitted)
     fitted = refit(here.bench, here.fitted.variant, here.fitted.track, columns)
     return Search(replace(quieter, found=Found(here.starts, fitted)), search.say)
 
@@ -111,7 +119,7 @@ def _promising(base: Base, here: Explained, reduced: Reduced) -> list[tuple[Hypo
     options = hypotheses.singles(reduced, free)[:LOOKED]
     if len(here.starts) + 2 <= rules.MOST:
         options += hypotheses.pairs(reduced, free)[:LOOKED]
-    own = _own(base, here.fitted)
+    own = effects_of(base, here.fitted)
     weighed = []
     for h in options:
         columns: dict[ColumnId, Column] = {**own, **{c: base.columns[c] for c in h.columns}}
@@ -131,7 +139,7 @@ def _fitted(
       bench: to fit with. reduced: linear algebra around `here`, which tells where to begin.
     """
     terms = (*here.fitted.variant.terms, *hypotheses.terms(reduced, more))
-    columns = {c: here.fitted.columns[c] for c in base.nuisances}
+    columns = nuisances_of(base, here.fitted)
     try:
         start = replace(here.fitted.variant, terms=terms)
         fitted = refit(bench, start, here.fitted.track, columns)
@@ -143,7 +151,7 @@ def _fitted(
 def _agreed(base: Base, one: Explained) -> Explained:
     """The explanation once its fit and the noise that it leaves agree."""
     for _ in range(ROUNDS):
-        columns = {c: one.fitted.columns[c] for c in base.nuisances}
+        columns = nuisances_of(base, one.fitted)
         fitted = refit(one.bench, one.fitted.variant, one.fitted.track, columns)
         more = _left(base, one.starts, fitted)
         if more.price > one.price - SETTLED:
@@ -154,27 +162,18 @@ def _agreed(base: Base, one: Explained) -> Explained:
 
 def _left(base: Base, starts: tuple[Start, ...], fitted: Fitted) -> Explained:
     """The explanation with the noise that its fit leaves."""
-    bench, deviance = _noise(base, fitted, _own(base, fitted))
+    bench, deviance = _noise(base, fitted, effects_of(base, fitted))
     return Explained(starts=starts, fitted=fitted, bench=bench, price=deviance + _penalty(starts))
 
 
 def _noise(base: Base, fitted: Fitted, own: dict[ColumnId, Column]) -> tuple[Bench, float]:
-    nuisances = {c: fitted.columns[c] for c in base.nuisances}
-    return noise_shown.left_by(base.bench, fitted.track, nuisances, own, given=True)
-
-
-def _own(base: Base, fitted: Fitted) -> dict[ColumnId, Column]:
-    """The columns of the effects that are in."""
-    return {c: column for c, column in fitted.columns.items() if c not in base.nuisances}
+    known = nuisances_of(base, fitted)
+    return noise_shown.left_by(base.bench, fitted.track, known, own, given=True)
 
 
 def _around(base: Base, bench: Bench, fitted: Fitted) -> Reduced:
     """The linear algebra of all columns around a fit whose effects are free."""
-    count = len(fitted.columns)
-    columns = {**fitted.columns, **base.columns}
-    free = count - len(base.nuisances)
-    system = bench.system(fitted.track, columns, count, fitted.variant, free=free)
-    return bounded.reduce(system, bench.windows)
+    return bounded.reduce(system_around(base, bench, fitted), bench.windows)
 
 
 def _penalty(starts: Sequence[Start]) -> float:

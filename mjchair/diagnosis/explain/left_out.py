@@ -47,17 +47,13 @@ def held_out(
     if np.unique(parts).size < 2:  # a single part: every other window
         parts = np.array([str(k % 2) for k in range(len(windows))])
     size = np.array([np.diag(full[0].G[i])[list(full[1])] for i in windows])
-    return sum(
-        _foretold(*plain, windows, ~inside) - _foretold(*full, windows, ~inside)
-        for inside in _left_out(parts, size)
-    )
 
+    def gained(known: NDArray[np.int64]) -> float:
+        return _evidence(*plain, known) - _evidence(*full, known)
 
-def _foretold(
-    system: System, which: Sequence[int], windows: NDArray[np.int64], known: NDArray[np.bool_]
-) -> float:
-    """Minus twice the logarithm of the predictive density of the windows that are not known."""
-    return _evidence(system, which, windows) - _evidence(system, which, windows[known])
+    # the density of all over that of the others is what the others predict of the left out
+    whole = gained(windows)
+    return sum(whole - gained(windows[~inside]) for inside in _left_out(parts, size))
 
 
 def _evidence(system: System, which: Sequence[int], windows: NDArray[np.int64]) -> float:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.hypotheses import Hypothesis, priced
-from mjchair.diagnosis.explain.screening import Base, Found
+from mjchair.diagnosis.explain.screening import Base, Found, nuisances_of
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.fit.column_ids import ColumnId
@@ -60,9 +60,9 @@ class NearFit:
     def refit(self, starts: Sequence[Start], rounds: int) -> Fitted:
         """The nonlinear fit that begins there."""
         near = self.found.fitted
-        columns = {c: near.columns[c] for c in self.base.nuisances}
         start = replace(near.variant, terms=self.terms(starts))
-        return refit(self.base.bench, start, near.track, columns, rounds)
+        known = nuisances_of(self.base, near)
+        return refit(self.base.bench, start, near.track, known, rounds)
 
     def physical(self, starts: Sequence[Start]) -> bool:
         """Whether what is new lies on the allowed side of its parameters."""
@@ -103,10 +103,7 @@ class NearFit:
         by = np.array(back)
         b = r.b - r.G[:, out] @ by
         total = r.total - 2.0 * r.b[out] @ by + by @ r.G[np.ix_(out, out)] @ by
-        block = r.G[np.ix_(which, which)]
-        scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
-        unit = block / np.outer(scale, scale) + 1e-8 * np.eye(len(which))
-        values = np.linalg.solve(unit, b[which] / scale) / scale
+        values = bounded.scaled_solve(r.G[np.ix_(which, which)], b[which])
         return which, values, float(total - b[which] @ values)
 
 

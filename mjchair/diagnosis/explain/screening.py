@@ -182,7 +182,7 @@ def _noise_left(base: Base, bench: Bench, reduced: Reduced) -> Bench:
         try:
             fitted = refit(bench, start, here, base.nuisances)
             here = fitted.track
-            own = {c: column for c, column in fitted.columns.items() if c not in base.nuisances}
+            own = effects_of(base, fitted)
         except (MjchairError, np.linalg.LinAlgError):
             pass  # these effects this chair cannot have: linear algebra must do
     return noise_shown.left_by(base.bench, here, base.nuisances, own)[0]
@@ -212,16 +212,27 @@ def _farthest(plain: Fitted) -> float:
     return float(np.abs(back[seen]).max(initial=0.0))
 
 
+def nuisances_of(base: Base, fitted: Fitted) -> dict[ColumnId, Column]:
+    """Of the columns of a fit, those of what is only roughly known."""
+    return {c: fitted.columns[c] for c in base.nuisances}
+
+
+def effects_of(base: Base, fitted: Fitted) -> dict[ColumnId, Column]:
+    """Of the columns of a fit, those of its effects."""
+    return {c: column for c, column in fitted.columns.items() if c not in base.nuisances}
+
+
+def system_around(base: Base, bench: Bench, fitted: Fitted) -> System:
+    """All columns around a fit whose effects are free, with the noise of a bench."""
+    count = len(fitted.columns)
+    columns = {**fitted.columns, **base.columns}
+    free = count - len(base.nuisances)
+    return bench.system(fitted.track, columns, count, fitted.variant, free=free)
+
+
 def gap_after(base: Base, fitted: Fitted) -> Gap:
     """Test what a fit leaves, with its own parameters free."""
     bench = base.bench
-    count = len(fitted.columns)
-    system = bench.system(
-        fitted.track,
-        {**fitted.columns, **base.columns},
-        count,
-        fitted.variant,
-        free=count - len(base.nuisances),
-    )
+    system = system_around(base, bench, fitted)
     keys = [t.effect.key for t in fitted.variant.terms]
     return gaps.test_gap(bench, system, bounded.reduce(system, bench.windows), keys)

@@ -76,10 +76,7 @@ class Reduced:
         return here, here._alone(w)
 
     def _alone(self, w: list[int]) -> Array:
-        block = self.G[np.ix_(w, w)]
-        scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
-        unit = block / np.outer(scale, scale) + 1e-8 * np.eye(len(w))
-        return np.asarray(np.linalg.solve(unit, self.b[w] / scale) / scale)
+        return scaled_solve(self.G[np.ix_(w, w)], self.b[w])
 
     def _walls(self, w: list[int], coefficients: Array) -> Active:
         """Which nuisances stand on a wall with these columns put in."""
@@ -166,6 +163,13 @@ class Sums:
     def plain(self) -> Reduced:
         """The elimination that is right where no column is put in."""
         return self.eliminated(())._settled([])[0]
+
+
+def scaled_solve(G: Array, b: Array) -> Array:
+    """Coefficients (q,) of columns with products G (q, q) and b (q,), which may be much alike."""
+    scale = np.sqrt(np.maximum(np.diag(G), 1e-300))
+    unit = G / np.outer(scale, scale) + 1e-8 * np.eye(len(b))
+    return np.asarray(np.linalg.solve(unit, b / scale) / scale)
 
 
 _KNOWN: WeakKeyDictionary[System, dict[tuple[int, ...], Reduced]] = WeakKeyDictionary()

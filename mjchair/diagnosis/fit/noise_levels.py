@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -188,16 +189,12 @@ def deviance(windows: Sequence[WindowColumns], levels: Levels) -> float:
     count = windows[0].J.shape[1]
     A, a, total = np.eye(count), np.zeros(count), 0.0
     for w in windows:
-        power = levels.bands[w.channel, w.band]
-        size = 1.0 / np.sqrt(power)
-        columns = _noise_columns(w, levels) * size[:, None]
-        factor = cho_factor(np.eye(columns.shape[1]) + columns.T @ columns)
-        J, r = w.J * size[:, None], w.r * size
-        H = J - columns @ cho_solve(factor, columns.T @ J)
+        _, columns, factor, J, r, H = _white(w, levels)
         A += J.T @ H
         a += H.T @ r
         shown = columns.T @ r
-        total += float(r @ r - shown @ cho_solve(factor, shown) + np.log(power).sum())
+        power = np.log(levels.bands[w.channel, w.band]).sum()
+        total += float(r @ r - shown @ cho_solve(factor, shown) + power)
         total += 2.0 * float(np.log(np.diag(factor[0])).sum())
     return total + float(np.linalg.slogdet(A)[1] - a @ np.linalg.solve(A, a))
 
@@ -208,14 +205,11 @@ def _looked_at(windows: Sequence[WindowColumns], levels: Levels) -> Seen:
     A, a = np.eye(count), np.zeros(count)
     kept = []
     for w in windows:
-        size = 1.0 / np.sqrt(levels.bands[w.channel, w.band])
-        columns = _noise_columns(w, levels) * size[:, None]
-        factor = cho_factor(np.eye(columns.shape[1]) + columns.T @ columns)
-        J, r = w.J * size[:, None], w.r * size
-        H = J - columns @ cho_solve(factor, columns.T @ J)
+        white = _white(w, levels)
+        *_, J, r, H = white
         A += J.T @ H
         a += H.T @ r
-        kept.append((w, size, columns, factor, J, r, H))
+        kept.append((w, *white))
     inverse = np.linalg.inv(A)
     best = inverse @ a
     seen = Seen()
@@ -239,6 +233,19 @@ def _looked_at(windows: Sequence[WindowColumns], levels: Levels) -> Seen:
             q, M = P.T @ left, _precision(P, columns, half, H, lean)
             seen.add(channel, 0, 1, float(q @ q), float(np.trace(M)))
     return seen
+
+
+def _white(w: WindowColumns, levels: Levels) -> tuple[Array, Array, Any, Array, Array, Array]:
+    """A window over the sensors' noise: what it was multiplied by, columns of what it is free in.
+
+    Then the factor that takes these away, the columns asked about, the residual, and the columns
+    asked about once these are taken away.
+    """
+    size = 1.0 / np.sqrt(levels.bands[w.channel, w.band])
+    columns = _noise_columns(w, levels) * size[:, None]
+    factor = cho_factor(np.eye(columns.shape[1]) + columns.T @ columns)
+    J, r = w.J * size[:, None], w.r * size
+    return size, columns, factor, J, r, J - columns @ cho_solve(factor, columns.T @ J)
 
 
 def _precision(P: Array, columns: Array, half: Array, H: Array, lean: Array) -> Array:
