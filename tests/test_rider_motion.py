@@ -144,3 +144,18 @@ def test_a_measured_motion_stands_in_for_both_forms_that_were_not_measured(heavy
     assert [len(e.parameters) for e in shown] == [4, 6]
     measured = [e for e in library((), (*columns, "rider_motion")) if e.name == "rider_motion"]
     assert [e.measured for e in measured] == ["rider_motion"]
+
+
+@pytest.mark.parametrize("mass", [20.0, 75.0])
+def test_an_accelerometer_shows_how_the_chair_gains_speed_under_a_moving_rider(mass):
+    spec = mjchair.load_spec("manual")
+    rider_motion.MEASURED.on(spec).apply(spec, {"mass": mass})
+    time = np.arange(0.0, 3.0, 0.005)
+    sway = 0.03 * (1.0 - np.cos(2.0 * np.pi * time))
+    inputs = mjchair.Inputs(time, {"rider_motion": sway})
+    run = mjchair.simulate(spec, inputs, 3.0, initial={"speed": 1.0}, sample_rate=500.0)
+    rolling = run.time > 1.0
+    gained = np.gradient(run["velocity.x"], run.time)[rolling]
+    # a chair that pitches by some mrad shows a little of gravity besides
+    off = run["imu_accelerometer.x"][rolling] - gained
+    assert np.std(off) < 0.1 * np.std(gained)

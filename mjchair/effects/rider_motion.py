@@ -18,15 +18,11 @@ import numpy as np
 
 from mjchair.effects.effect import Effect, Parameter, Values, Wave
 from mjchair.engine import element
-from mjchair.model import inertials, moving_share, parts
+from mjchair.model import moving_share, parts, slide
 
 FREQUENCIES = tuple(float(f) for f in np.arange(0.4, 2.01, 0.05))  # Hz, that are searched
 MOTION = "rider_motion"
 HEIGHT = 0.85  # m above the ground: centre of mass of a seated trunk with head and arms
-# A spring and a damper let the moving mass follow the measured motion, with a delay of
-# 2 DAMPING / FOLLOW = 7 ms and an amplitude error of a thousandth at 1 Hz.
-FOLLOW = 2.0 * math.pi * 30.0  # rad/s
-DAMPING = 0.7  # of critical damping
 MASS = (
     40.0  # kg: head, arms and trunk of a person of 75 kg (Winter 2009: 0.68), less the seat's part
 )
@@ -67,22 +63,8 @@ def measured(spec: mujoco.MjSpec, mass: float) -> None:
     if mass <= 0.0:
         return
     moving = moving_share.take(spec, mass)
-    chair = parts.named(spec.bodies, "chair", "body")
-    body = chair.add_body(name=MOTION, pos=moving.centre)
-    body.add_joint(name=MOTION, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1.0, 0.0, 0.0])
-    inertials.write(body, inertials.Inertial(mass, np.zeros(3), moving.tensor))
-    body.explicitinertial = True
-    gain, bias = np.zeros(10), np.zeros(10)
-    gain[0] = mass * FOLLOW**2
-    bias[1:3] = -mass * FOLLOW**2, -2.0 * DAMPING * mass * FOLLOW
-    spec.add_actuator(
-        name=MOTION,
-        trntype=mujoco.mjtTrn.mjTRN_JOINT,
-        target=MOTION,
-        gainprm=gain,
-        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
-        biasprm=bias,
-    )
+    slide.add(spec, MOTION, moving)
+    slide.drive(spec, MOTION, MOTION, displacement=mass / moving.mass)
 
 
 def _swaying(sine: float, cosine: float, frequency: float) -> Values:

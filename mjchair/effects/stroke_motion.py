@@ -19,8 +19,7 @@ import mujoco
 import numpy as np
 
 from mjchair.effects.effect import Effect, Parameter, Seed, Values, clip
-from mjchair.effects.rider_motion import DAMPING, FOLLOW
-from mjchair.model import inertials, moving_share, parts
+from mjchair.model import moving_share, slide
 
 JOINT = "stroke_motion"
 HARMONICS = 3  # of the phase of the strokes
@@ -62,26 +61,11 @@ def move(spec: mujoco.MjSpec, **moments: float) -> None:
     """
     if not any(moments.values()):
         return
-    mass = upper_body(spec)
-    moving = moving_share.take(spec, mass)
-    chair = parts.named(spec.bodies, "chair", "body")
-    body = chair.add_body(name=JOINT, pos=moving.centre)
-    body.add_joint(name=JOINT, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1.0, 0.0, 0.0])
-    inertials.write(body, inertials.Inertial(mass, np.zeros(3), moving.tensor))
-    body.explicitinertial = True
+    moving = moving_share.take(spec, upper_body(spec))
+    slide.add(spec, JOINT, moving)
     for k, wave in enumerate(WAVES):
-        gain, bias = np.zeros(10), np.zeros(10)
-        gain[0] = FOLLOW**2 * moments.get(wave, 0.0)  # a spring's stiffness times displacement
-        if k == 0:  # the stiffness of the spring belongs to one actuator only
-            bias[1:3] = -mass * FOLLOW**2, -2.0 * DAMPING * mass * FOLLOW
-        spec.add_actuator(
-            name=f"stroke_{wave}",
-            trntype=mujoco.mjtTrn.mjTRN_JOINT,
-            target=JOINT,
-            gainprm=gain,
-            biastype=mujoco.mjtBias.mjBIAS_AFFINE,
-            biasprm=bias,
-        )
+        displacement = moments.get(wave, 0.0) / moving.mass
+        slide.drive(spec, JOINT, f"stroke_{wave}", displacement, holds=k == 0)
 
 
 def first_moment(values: Mapping[str, float], std: Mapping[str, float]) -> tuple[float, float]:

@@ -7,22 +7,51 @@ rest of the person with it. So the whole of a person can move on a chair, and wh
 the frame, which has a mass and an inertia. A little more than the person can move too: mass and
 displacement are measured as a product, and a displacement that is 5 % short makes the mass 5 %
 large.
+
+The share and the rest turn together, so that only the sum of their inertias shows. It is shared
+out by mass, which makes two bodies that can be wherever the whole can be.
 """
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from mjchair.errors import MjchairError
 from mjchair.model import inertials, merged_visual_geoms, seating
 from mjchair.model.inertials import Inertial
 from mjchair.model.wheels import base_name
 
+Array = NDArray[np.float64]
 STAYS = ("pelvis", "thigh", "shank", "foot")  # of the person: what rests on seat and footrest
 MORE = 1.1  # of the person's mass that may move at most, of a displacement that is a tenth short
 LEFT = 0.05  # of the mass of the chair's body that stays in any case
 UNKNOWN = 0.9  # of the mass of a chair's body that may move where nobody says who sits on it
+REMEMBERED = "rider_share"  # custom numeric: the most that moves, then upper body and rest
+NUMBERS = 13  # of a body: mass, centre (3), inertia (9)
+HALVINGS = 30
+
+
+def remember(spec: mujoco.MjSpec, shown: mujoco.MjSpec) -> None:
+    """Note in a chair without visual geoms who sits on it, in place.
+
+    A variant of this chair then moves the same person, and as much of it at most, whatever else
+    was edited.
+
+    Args:
+      shown: the same chair with its visual geoms.
+    """
+    shown = shown.copy()  # the chair's inertial is written into its body
+    numbers = [most(shown)]
+    for body in person(shown) or ():
+        numbers += [body.mass, *body.centre, *body.tensor.ravel()]
+    spec.add_numeric(name=REMEMBERED, size=len(numbers), data=numbers)
+
+
+def _remembered(spec: mujoco.MjSpec) -> list[float] | None:
+    known = next((n for n in spec.numerics if n.name == REMEMBERED), None)
+    return None if known is None else [float(x) for x in known.data]
 
 
 def person(spec: mujoco.MjSpec) -> tuple[Inertial, Inertial] | None:
@@ -30,6 +59,11 @@ def person(spec: mujoco.MjSpec) -> tuple[Inertial, Inertial] | None:
 
     None: the chair does not show its rider as the shipped ones do.
     """
+    known = _remembered(spec)
+    if known is not None:
+        bodies = [known[1 + k * NUMBERS :][:NUMBERS] for k in range((len(known) - 1) // NUMBERS)]
+        upper, rest = [_inertial(b) for b in bodies] if bodies else (None, None)
+        return None if upper is None or rest is None else (upper, rest)
     copy = spec.copy()
     merged_visual_geoms.separate(copy)
     try:
@@ -38,8 +72,12 @@ def person(spec: mujoco.MjSpec) -> tuple[Inertial, Inertial] | None:
     except MjchairError:
         return None
     below = [g for g in geoms if base_name(g.name).endswith(STAYS)]
-    upper = [g for g in geoms if not base_name(g.name).endswith(STAYS)]
-    return inertials.of_geoms(upper), inertials.of_geoms(below)
+    upper_body = [g for g in geoms if not base_name(g.name).endswith(STAYS)]
+    return inertials.of_geoms(upper_body), inertials.of_geoms(below)
+
+
+def _inertial(numbers: list[float]) -> Inertial:
+    return Inertial(numbers[0], np.array(numbers[1:4]), np.reshape(numbers[4:], (3, 3)))
 
 
 def most(spec: mujoco.MjSpec) -> float:
@@ -47,6 +85,9 @@ def most(spec: mujoco.MjSpec) -> float:
 
     Of a chair of unknown load, 0.9 of its body.
     """
+    known = _remembered(spec)
+    if known is not None:
+        return known[0]
     sitting, chair = person(spec), float(_chair(spec).mass)
     if sitting is None:
         return UNKNOWN * chair
@@ -55,6 +96,9 @@ def most(spec: mujoco.MjSpec) -> float:
 
 def share(spec: mujoco.MjSpec, mass: float) -> Inertial:
     """What moves when `mass` (kg) of the rider moves, in the chair's frame.
+
+    Of a variant that is lighter than the chair that it was made of, LEFT of the chair's body
+    stays: then what moves has less mass and must move farther, since the product counts.
 
     Raises:
       MjchairError: a mass that is not positive, or more than `most`.
@@ -65,36 +109,52 @@ def share(spec: mujoco.MjSpec, mass: float) -> Inertial:
             f"{mass:g} kg cannot move on this chair; with its rider (occupant_mass) the mass that "
             f"moves must be positive and at most {limit:.4g} kg"
         )
-    sitting = person(spec)
-    chair = _chair(spec)
-    if sitting is not None:
-        upper, rest = sitting
-        first = min(mass, upper.mass)
-        moving = upper.scaled(first / upper.mass)
-        second = min(mass - first, rest.mass)
-        if second > 0.0:
-            moving = moving.plus(rest.scaled(second / rest.mass))
-        if mass > first + second:
-            frame = inertials.of_body(chair).plus(moving, sign=-1.0)
-            moving = moving.plus(frame.scaled((mass - first - second) / frame.mass))
-        if _can_be(inertials.of_body(chair).plus(moving, sign=-1.0)):
-            return moving
-    # a chair whose inertia was changed apart from its rider's: an even share of all of it
-    return inertials.of_body(chair).scaled(mass / float(chair.mass))
+    chair = inertials.of_body(_chair(spec))
+    mass = min(mass, (1.0 - LEFT) * chair.mass)
+    return _part(chair, mass, _centre(person(spec), chair, mass))
+
+
+def _centre(sitting: tuple[Inertial, Inertial] | None, chair: Inertial, mass: float) -> Array:
+    """Centre of mass (3,) m of what moves; without a rider, of the chair's body."""
+    if sitting is None:
+        return chair.centre
+    upper, rest = sitting
+    first = min(mass, upper.mass)
+    second = min(mass - first, rest.mass)
+    moment = first * upper.centre + second * rest.centre
+    beyond = mass - first - second
+    if beyond > 0.0:  # an even share of the frame
+        frame = chair.mass - upper.mass - rest.mass
+        own = chair.mass * chair.centre - upper.mass * upper.centre - rest.mass * rest.centre
+        moment = moment + beyond * (own / frame if frame > beyond else chair.centre)
+    return np.asarray(moment / mass)
+
+
+def _part(chair: Inertial, mass: float, centre: Array) -> Inertial:
+    """The part of a body that has this mass, and this centre (3,) m as far as it can."""
+    away = centre - chair.centre
+    apart = mass * chair.mass / (chair.mass - mass)
+    apart_tensor = apart * (away @ away * np.eye(3) - np.outer(away, away))
+
+    def both(share: float) -> Array:
+        return np.asarray(chair.tensor - share**2 * apart_tensor)
+
+    low, high = 0.0, 1.0
+    if not _can_be(both(1.0)):  # a chair whose inertia was changed apart from its rider's
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if _can_be(both(middle)) else (low, middle)
+        high = low
+    return Inertial(mass, chair.centre + high * away, mass / chair.mass * both(high))
 
 
 def take(spec: mujoco.MjSpec, mass: float) -> Inertial:
     """Take the share that moves off the chair's body, in place, and return it.
 
     Raises:
-      MjchairError: as `share` does, or a chair lighter than what moves.
+      MjchairError: as `share` does.
     """
     chair = _chair(spec)
-    if mass >= float(chair.mass):
-        raise MjchairError(
-            f"{mass:g} kg cannot move on a chair that weighs {float(chair.mass):.4g} kg with its "
-            "rider and without wheels"
-        )
     moving = share(spec, mass)
     inertials.write(chair, inertials.of_body(chair).plus(moving, sign=-1.0))
     return moving
@@ -104,9 +164,7 @@ def _chair(spec: mujoco.MjSpec) -> mujoco.MjsBody:
     return inertials.explicit(spec, "chair")
 
 
-def _can_be(left: Inertial) -> bool:
-    """Whether a body has this mass and inertia, with a hundredth to spare."""
-    if left.mass <= 0.0:
-        return False
-    low, middle, high = np.linalg.eigvalsh(left.tensor)
+def _can_be(tensor: Array) -> bool:
+    """Whether a body has this inertia (3, 3), with a hundredth to spare."""
+    low, middle, high = np.linalg.eigvalsh(tensor)
     return bool(low > 0.0 and low + middle > 1.01 * high)

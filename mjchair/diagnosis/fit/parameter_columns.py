@@ -6,6 +6,8 @@ changes.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mjchair.diagnosis.fit.bench import Bench
@@ -15,6 +17,7 @@ from mjchair.diagnosis.replay import derivatives
 from mjchair.diagnosis.replay.derivatives import Column, Point
 from mjchair.diagnosis.replay.window_states import Track
 
+PART = 0.5  # standard deviations of a nuisance by which its derivative is taken
 FINER = 1.5  # difference of two step sizes to that of this step to none, with a margin
 
 
@@ -23,7 +26,7 @@ def nuisance_columns(bench: Bench, track: Track, variant: Variant) -> dict[Colum
     simulator = bench.simulator
     mechanical = [n for n in bench.nuisances if n.edit is not None]
     points = [
-        *derivatives.nuisance_points(mechanical),
+        *(Point(_with_more(variant, n.name).edit, 1.0 / PART, whole=True) for n in mechanical),
         Point(derivatives.half_step, FINER, fine=True),
         Point(derivatives.other_integrator, FINER, fine=True),
     ]
@@ -47,6 +50,16 @@ def nuisance_columns(bench: Bench, track: Track, variant: Variant) -> dict[Colum
                 simulator, track, n.error, n.channel, n.std
             )
     return out
+
+
+def _with_more(variant: Variant, name: str) -> Variant:
+    """The variant with PART more of a nuisance, which is in the chair before its effects are.
+
+    A chair 2 kg heavier is one whose frame is: of a person who moves on it nothing was added.
+    """
+    return replace(
+        variant, offsets={**variant.offsets, name: variant.offsets.get(name, 0.0) + PART}
+    )
 
 
 def term_columns(bench: Bench, track: Track, variant: Variant) -> dict[ColumnId, Column]:

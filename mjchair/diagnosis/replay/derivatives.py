@@ -13,7 +13,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjchair.diagnosis.data.roughly_known import Nuisance
 from mjchair.diagnosis.replay.sampling import residual
 from mjchair.diagnosis.replay.sensor_errors import SensorErrors, delayed
 from mjchair.diagnosis.replay.simulator import Job, WindowSimulator
@@ -27,11 +26,17 @@ Column = list[Array]  # (rows, channels) a window
 
 @dataclass(frozen=True)
 class Point:
-    """A model to compare with the base: an edit, and what its difference is multiplied by."""
+    """A model to compare with the base: an edit, and what its difference is multiplied by.
+
+    Attributes:
+      fine: whether it is compared at the fine step. whole: whether the edit makes the model of the
+        study's chair by itself; False: on top of what the base has.
+    """
 
     edit: Callable[[mujoco.MjSpec], None]
     factor: float = 1.0
     fine: bool = False
+    whole: bool = False
 
 
 def differences(
@@ -57,7 +62,7 @@ def differences(
         for point in points:
 
             def edit(spec: mujoco.MjSpec, point: Point = point) -> None:
-                if base_edit is not None:
+                if base_edit is not None and not point.whole:
                     base_edit(spec)
                 point.edit(spec)
 
@@ -128,14 +133,3 @@ def effect_points(effect: Effect, seed: Seed) -> list[Point]:
 
     factors = seed.factors or (1.0,) * len(seed.points)
     return [Point(edit(v), f) for v, f in zip(seed.points, factors, strict=True)]
-
-
-def nuisance_points(nuisances: Sequence[Nuisance]) -> list[Point]:
-    """One standard deviation of each nuisance, from half of one."""
-
-    def edit(n: Nuisance) -> Callable[[mujoco.MjSpec], None]:
-        assert n.edit is not None
-        change = n.edit
-        return lambda spec: change(spec, 0.5 * n.std)
-
-    return [Point(edit(n), 2.0) for n in nuisances if n.edit is not None]

@@ -9,34 +9,45 @@ of the column's name, that follows it; a joint of the name starts at its place a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
 
 from mjchair.diagnosis.data.study import Run
 
 Array = NDArray[np.float64]
-SMOOTHING = 0.12  # s, half width of the parabola through a measured motion
+CUTOFF = 6.0  # Hz, below which a body moves: usual for markers on trunk and arms (Winter 2009)
+NYQUIST = 0.8  # of half the sample rate: a cutoff above it smooths nothing
 FEWEST = 8  # samples
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A measured motion on an even grid: time (n,) s, place (n,) m, speed (n,) m/s."""
+    """A motion on an even grid: time (n,) s, place (n,) in its unit.
+
+    Between the samples it is a cubic spline, whose acceleration has no steps: straight lines would
+    push the chair at every sample. Before and after them it keeps its speed.
+    """
 
     time: Array
     place: Array
-    speed: Array
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        return CubicSpline(self.time, self.place)
 
     def place_at(self, time: Array) -> Array:
-        """Place at times (s), m."""
-        return np.asarray(np.interp(time, self.time, self.place))
+        """Place at times (s)."""
+        inside = np.clip(time, self.time[0], self.time[-1])
+        return np.asarray(self._spline(inside) + (time - inside) * self._spline(inside, 1))
 
     def start(self, time: float) -> tuple[float, float]:
-        """Place (m) and speed (m/s) at a time (s)."""
-        place, speed = (np.interp(time, self.time, v) for v in (self.place, self.speed))
-        return float(place), float(speed)
+        """Place, and speed (1/s), at a time (s)."""
+        inside = float(np.clip(time, self.time[0], self.time[-1]))
+        return float(self.place_at(np.array(time))), float(self._spline(inside, 1))
 
 
 def motions(run: Run) -> dict[str, Motion]:
@@ -53,6 +64,8 @@ def _smoothed(time: Array, values: Array) -> Motion | None:
     rate = 1.0 / float(np.median(np.diff(time)))
     grid = np.arange(time[0], time[-1], 1.0 / rate)
     even = np.interp(grid, time, place)
-    width = min(2 * max(2, round(SMOOTHING * rate)) + 1, 2 * ((even.size - 1) // 2) - 1)
-    smooth = savgol_filter(even, width, 3) if width > 3 else even
-    return Motion(grid, smooth, np.gradient(smooth, grid))
+    smooth = even
+    if NYQUIST * 0.5 * rate > CUTOFF:  # once forward and once back, so that nothing is late
+        low_pass = butter(2, CUTOFF, fs=rate, output="sos")
+        smooth = sosfiltfilt(low_pass, even, padlen=min(round(rate), even.size - 1))
+    return Motion(grid, smooth)

@@ -24,6 +24,7 @@ from mjchair.diagnosis.replay.sampling import places, sampled
 from mjchair.diagnosis.replay.state_transfer import StateCarrier
 from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
+from mjchair.model import moving_share, slide
 from mjchair.model.load import loaded
 from mjchair.model.visual_geoms import without_visual_geoms
 from mjchair.model.wheels import COMFORTABLE, check_timestep, cut_damping
@@ -78,6 +79,7 @@ class WindowSimulator:
         self.study = study
         self.channels = study.channels
         self.spec = without_visual_geoms(study.spec)
+        moving_share.remember(self.spec, study.spec)
         self.base = self.spec.copy().compile()
         self.chair = Chair(self.base)
         self.step = float(self.base.opt.timestep)
@@ -157,7 +159,9 @@ class WindowSimulator:
         for column, motion in self.motions[window.run].items():
             if column in known:
                 a = known.index(column)
-                out[:, a] = motion.place_at(time + _lag(model, a))
+                out[:, a] = motion.place_at(
+                    time + slide.delay(model, int(model.actuator_trnid[a, 0]))
+                )
         return out
 
     def _followed(self, model: mujoco.MjModel, joint: str, job: Job) -> tuple[float, float] | None:
@@ -287,18 +291,6 @@ class WindowSimulator:
         values = sensed[:, self._places[model.nsensordata]]
         time = self.study.runs[window.run].trial.time[window.rows] - window.start
         return sampled(values, model.opt.timestep, time, self.channels)
-
-
-def _lag(model: mujoco.MjModel, actuator: int) -> float:
-    """Time (s) by which a joint comes after its position inputs: damping over stiffness.
-
-    A spring and a damper hold the joint to a place that moves. The damper brakes against the
-    chair, so the joint is late by that time; inputs that are given as much earlier make it follow.
-    """
-    of_joint = model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
-    of_joint &= model.actuator_trnid[:, 0] == model.actuator_trnid[actuator, 0]
-    stiffness, damping = -model.actuator_biasprm[of_joint, 1:3].sum(axis=0)
-    return float(damping / stiffness) if stiffness > 0.0 else 0.0
 
 
 def _given(run: Run) -> Iterator[Part]:

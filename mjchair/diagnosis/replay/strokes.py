@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from mjchair.diagnosis.data.study import Run
+from mjchair.diagnosis.replay.measured_motion import Motion
 from mjchair.effects import stroke_motion
 
 Array = NDArray[np.float64]
@@ -104,26 +105,7 @@ def bouts(begins: Array) -> list[Bout]:
     return [Bout(part, period) for part in parts]
 
 
-@dataclass(frozen=True)
-class Course:
-    """Values (n,) of one motion on an even grid of times (n,), s."""
-
-    time: Array
-    place: Array
-
-    def place_at(self, time: Array) -> Array:
-        """The value at times (s)."""
-        return np.asarray(np.interp(time, self.time, self.place))
-
-    def start(self, time: float) -> tuple[float, float]:
-        """Value and its rate (1/s) at a time (s)."""
-        rate = np.gradient(self.place, self.time)
-        return float(np.interp(time, self.time, self.place)), float(
-            np.interp(time, self.time, rate)
-        )
-
-
-def courses(run: Run) -> dict[str, Course]:
+def courses(run: Run) -> dict[str, Motion]:
     """Sines and cosines of the phase of a run's strokes, by the name of their column.
 
     They are zero where nobody pushes. A run without strokes has none.
@@ -132,7 +114,7 @@ def courses(run: Run) -> dict[str, Course]:
 
 
 @lru_cache(maxsize=256)
-def _courses(begins: bytes, first: float, duration: float) -> tuple[tuple[str, Course], ...]:
+def _courses(begins: bytes, first: float, duration: float) -> tuple[tuple[str, Motion], ...]:
     pushed = bouts(np.frombuffer(begins))
     if not pushed:
         return ()
@@ -141,4 +123,4 @@ def _courses(begins: bytes, first: float, duration: float) -> tuple[tuple[str, C
     for bout in pushed:
         for name, values in stroke_motion.waves(bout.phase(time)).items():
             total[name] += bout.share(time) * values
-    return tuple((name, Course(time, values)) for name, values in total.items())
+    return tuple((name, Motion(time, values)) for name, values in total.items())

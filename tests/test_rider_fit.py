@@ -1,0 +1,92 @@
+"""The mass that moves on a chair, fitted to a push of a person of five segments."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from five_segments import NOISE, Case, Hidden, tables
+
+import mjchair
+from mjchair.diagnosis.data.roughly_known import nuisances
+from mjchair.diagnosis.data.study import Run, make_study
+from mjchair.diagnosis.fit.bench import Bench
+from mjchair.diagnosis.fit.column_ids import ParameterId, RoughlyKnown
+from mjchair.diagnosis.fit.nonlinear import refit
+from mjchair.diagnosis.fit.parameter_columns import nuisance_columns
+from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.diagnosis.replay import noise
+from mjchair.diagnosis.replay.derivatives import predictions
+from mjchair.diagnosis.replay.sensor_errors import SensorErrors
+from mjchair.diagnosis.replay.simulator import WindowSimulator
+from mjchair.diagnosis.replay.window_states import track
+from mjchair.effects import rider_motion
+from mjchair.measurement.trial import Trial
+from mjchair.simulation.initial import Initial
+from mjchair.simulation.inputs import Inputs
+
+SECONDS = 4.2
+KEY = ParameterId("rider_motion", "mass")
+
+
+@pytest.fixture(scope="module")
+def push():
+    """A bench of one push, its first track, and the variant in which a mass (kg) moves."""
+    spec = mjchair.load_spec("manual")
+    columns = tables(Case(Hidden(rolling=0.0), coasts=0, pushes=1), seed=3)[0]["push_1"]
+    columns = {name: values[columns["time"] < SECONDS] for name, values in columns.items()}
+    time = columns.pop("time")
+    driven = {name: columns.pop(name) for name in ("left_wheel", "right_wheel")}
+    other = {"rider_motion": columns.pop("rider_motion")}
+    trial = Trial("push", time, columns, Inputs(time, driven), other)
+    made = Run(trial, "push", False, Initial(speed=0.9), frozenset({"heading"}))
+    study = make_study(spec, [made], NOISE)
+    simulator = WindowSimulator(study, threads=1)
+    bench = Bench(simulator, noise.estimate(study), nuisances(study.channels, {}))
+    effect = rider_motion.MEASURED.on(spec)
+
+    def moving(mass):
+        return Variant(bench.nuisances, terms=(Term(effect, {"mass": mass}, ("mass",)),))
+
+    return bench, track(simulator, simulator.base, bench.noise), moving
+
+
+def test_the_fit_ends_at_the_same_mass_from_starts_25_kg_apart(push):
+    bench, first, moving = push
+    ends = [refit(bench, moving(mass), first) for mass in (55.0, 80.0)]
+    # columns of what is roughly known are those of the start, so once more from the end
+    ends = [refit(bench, end.variant, end.track) for end in ends]
+    one, other = (end.variant.terms[0].values["mass"] for end in ends)
+    error = max(end.std[KEY] for end in ends)
+    assert abs(one - other) < 0.2 * error
+    assert all(end.total - end.promised < 1.0 for end in ends)
+    # the whole person of 75 kg moves; 15 % is what is asked of a measured motion
+    assert one == pytest.approx(75.0, rel=0.15)
+
+
+def test_what_is_roughly_known_is_in_the_chair_before_a_person_moves_on_it(push):
+    """A chair 5 % heavier is 4 kg heavier, not 5 % of what the person leaves of it."""
+    bench, first, moving = push
+    simulator, variant = bench.simulator, moving(70.0)
+    errors = SensorErrors(simulator.channels)
+    model = simulator.compile(variant.edit)
+    here = track(simulator, model, bench.noise, errors, first, anew=True)
+    heavier = simulator.compile(replace(variant, offsets={"mass": 1.0}).edit)
+    change = predictions(simulator, here, heavier, errors)
+    column = nuisance_columns(bench, here, variant)[RoughlyKnown("mass")]
+    speed = list(simulator.channels).index("left_wheel_speed")
+    for mine, there, linear in zip(here.predicted, change, column, strict=True):
+        seen = (there - mine)[:, speed]
+        assert np.std(linear[:, speed] - seen) < 0.2 * np.std(seen)
+
+
+def test_a_variant_too_light_for_its_rider_moves_less_mass_farther(push):
+    bench, _, moving = push
+    light = replace(moving(80.0), offsets={"mass": -3.0})
+    model = bench.simulator.compile(light.edit)
+    body, actuator = model.body("rider_motion"), model.actuator("rider_motion")
+    reach = actuator.gainprm[0] / -actuator.biasprm[1]
+    assert body.mass[0] < 72.25 and math.isclose(body.mass[0] * reach, 80.0, rel_tol=1e-9)
+    # the simulator shows no person, and moves one nevertheless: the upper body is high
+    half = bench.simulator.compile(moving(36.0).edit)
+    assert half.body("rider_motion").ipos[2] + half.body("rider_motion").pos[2] > 0.85
