@@ -163,7 +163,7 @@ def test_one_window_neither_rules_a_rival_out_nor_keeps_it(worse, stays):
         Hypothesis((MOTOR,), 400.0, 390.0),
         SimpleNamespace(total=theirs.sum(), chi2=theirs, at_bound=()),
     )
-    assert search._not_ruled_out(rival, chosen, total + 2000.0) == stays
+    assert search._not_ruled_out(rival, chosen, 2000.0) == stays
 
 
 def test_where_no_second_effect_stands_no_third_is_tried(fits, monkeypatch):
@@ -184,3 +184,29 @@ def test_where_no_second_effect_stands_no_third_is_tried(fits, monkeypatch):
     chosen = search.choose(base, SimpleNamespace(exists=True), lambda line: None)
     assert chosen.hypothesis is ONE
     assert "motor+rolling+scrub" not in {keys for keys, _ in fits.asked}
+
+
+@pytest.mark.parametrize(("worse", "stays"), [(60.0, True), (200.0, False)])
+def test_a_rival_of_one_effect_is_weighed_against_what_that_effect_brings(
+    worse, stays, monkeypatch
+):
+    """The motor brings 4000 beside a rolling resistance that brings 60 000."""
+    scrub = effect("scrub")
+    gains = {("rolling",): 60_000.0, ("motor",): 5_000.0, ("motor", "rolling"): 64_000.0}
+    other = Hypothesis((ROLLING, scrub), gain=64_000.0 - worse, score=63_990.0 - worse)
+    looking = searching()
+    looking.base.plain.total = 65_000.0
+    looking.weigh = lambda starts: Hypothesis(
+        tuple(starts), gains[tuple(sorted(s.effect.key for s in starts))], 0.0
+    )
+    of_all = np.resize([4.0, -4.0], 20)
+    ours = SimpleNamespace(total=1_000.0, chi2=np.full(20, 50.0), at_bound=())
+    theirs = SimpleNamespace(total=1_000.0 + worse, chi2=50.0 + worse / 20.0 + of_all, at_bound=())
+    both = Hypothesis((ROLLING, MOTOR), gain=64_000.0, score=63_990.0)
+    monkeypatch.setattr(
+        search, "_replacements", lambda _, start, __: [other] if start is MOTOR else []
+    )
+    looking.fit = lambda hypothesis, best=None: search.Tried(hypothesis, theirs)
+    chosen = search.Tried(both, ours)
+    assert looking.own_gain(chosen, MOTOR) == 4_000.0
+    assert [len(group) for group in looking.rivals(chosen)] == [0, int(stays)]

@@ -174,9 +174,13 @@ def _plan(base: Base, choice: Choice, once: bool) -> tuple[Plan | None, list[str
       once: whether something that happened once fits about as well.
     """
     chosen = choice.fitted
-    gained = gain(base, chosen)
-    near = [r.fitted for group in choice.rivals for r in group]
-    needed = [rules.to_rule_out(behind=r.total - chosen.total, gain=gained) for r in near]
+    rivals = [
+        (r.fitted, own)
+        for group, own in zip(choice.rivals, choice.own_gains, strict=True)
+        for r in group
+    ]
+    near = [r for r, _ in rivals]
+    needed = [rules.to_rule_out(behind=r.total - chosen.total, gain=own) for r, own in rivals]
     if once:
         near.append(base.plain)
         needed.append(rules.to_show_again(event=event.largest(base), gain=choice.hypothesis.gain))

@@ -33,6 +33,7 @@ class Choice:
       hypothesis: effects. fitted: their fit, everything made anew around it.
       after: the gap that is left with one effect, with two, and so on; the last is the choice's.
       rivals: for every effect, what could stand in its place, best first.
+      own_gains: of every effect, the chi2 that it brings beside the others.
       tried: every fit that was made.
       dropped: a line for each hypothesis that this chair cannot have.
     """
@@ -41,6 +42,7 @@ class Choice:
     fitted: Fitted
     after: list[Gap]
     rivals: list[list[Rival]]
+    own_gains: list[float]
     tried: list[Rival] = field(default_factory=list)
     dropped: list[str] = field(default_factory=list)
 

@@ -15,12 +15,12 @@ import numpy as np
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import hypotheses
 from mjchair.diagnosis.explain.candidates import Start
-from mjchair.diagnosis.explain.choice import Choice, Rival
+from mjchair.diagnosis.explain.choice import Choice, Rival, gain
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.left_out import held_out, with_terms
 from mjchair.diagnosis.explain.near_fit import near_fit
-from mjchair.diagnosis.explain.screening import Base, Say, gap_after
+from mjchair.diagnosis.explain.screening import Base, Found, Say, gap_after
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
 from mjchair.diagnosis.fit.variant import Term, Variant
@@ -56,7 +56,7 @@ def choose(base: Base, gap: Gap, say: Say, search: Search | None = None) -> Choi
     best, after = search.found() if base.found else _grown(search)
     if best is None:
         return None
-    best, rivals = search.against_rivals(search.without_needless(best))
+    best, rivals = search.against_rivals(search.near_itself(search.without_needless(best)))
     say("the last fit, with everything made anew around it")
     fitted = search.anew(best)
     after[-1] = gap_after(base, fitted)
@@ -65,6 +65,7 @@ def choose(base: Base, gap: Gap, say: Say, search: Search | None = None) -> Choi
         fitted=fitted,
         after=after,
         rivals=rivals,
+        own_gains=[search.own_gain(best, start) for start in best.hypothesis.starts],
         tried=search.tried,
         dropped=search.dropped,
     )
@@ -230,6 +231,27 @@ class Search:
                 return self.without_needless(other)
         return tried
 
+    def near_itself(self, chosen: Tried) -> Tried:
+        """The chosen hypothesis, and from here on all linear algebra around its fit.
+
+        Beside a large effect, the algebra around a chair without any is wrong by more than a small
+        one brings.
+        """
+        starts = chosen.hypothesis.starts
+        if len(starts) == 1 or self.near is not None:
+            return chosen
+        self.near = near_fit(self.base, Found(starts, self.anew(chosen)))
+        return Tried(self.weigh(starts), chosen.fitted)
+
+    def own_gain(self, chosen: Tried, start: Start) -> float:
+        """Chi2 that one effect of the chosen hypothesis brings beside the others."""
+        hypothesis = chosen.hypothesis
+        whole = gain(self.base, chosen.fitted)
+        others = [s for s in hypothesis.starts if s is not start]
+        if not others:
+            return whole
+        return float(np.clip(hypothesis.gain - self.weigh(others).gain, 0.0, max(whole, 0.0)))
+
     def against_rivals(self, chosen: Tried) -> tuple[Tried, list[list[Rival]]]:
         """The best of the chosen hypothesis and what could stand in its places, with its rivals.
 
@@ -256,13 +278,14 @@ class Search:
         out = []
         for start in hypothesis.starts:
             others = tuple(s for s in hypothesis.starts if s is not start)
-            near = [h for h in _replacements(self, start, others) if _close(hypothesis, h)]
+            own = self.own_gain(chosen, start)
+            near = [h for h in _replacements(self, start, others) if _close(hypothesis, h, own)]
             tried = [self.fit(h, chosen) for h in near[:most]]
             out.append(
                 [
                     Rival(t.hypothesis, t.fitted)
                     for t in tried
-                    if t is not None and _not_ruled_out(t, chosen, self.base.plain.total)
+                    if t is not None and _not_ruled_out(t, chosen, own)
                 ]
             )
         return out
@@ -464,8 +487,12 @@ def _freed(search: Search, hypothesis: Hypothesis, start: Start) -> Hypothesis:
     return weighed[min(richer, key=len)] if len(alike) > len(start.columns) else hypothesis
 
 
-def _not_ruled_out(rival: Tried, chosen: Tried, plain: float) -> bool:
-    """Whether the data leave a rival standing; `plain` is the chi2 without effects.
+def _not_ruled_out(rival: Tried, chosen: Tried, brought: float) -> bool:
+    """Whether the data leave a rival standing.
+
+    Args:
+      brought: chi2, by the effect in whose place the rival would stand. It is the form of this
+        effect that may be wrong; what others bring beside it is no measure of that.
 
     It is also out where all windows but the one that tells most against it rule it out: that one
     makes the scatter over windows so large that it hides what the others say.
@@ -480,7 +507,7 @@ def _not_ruled_out(rival: Tried, chosen: Tried, plain: float) -> bool:
     return all(
         rules.stays_a_rival(
             behind=by,
-            gain=plain - chosen.fitted.total,
+            gain=brought,
             errors=rules.paired_errors(other, own),
             beyond_bound=bool(rival.fitted.at_bound and not chosen.fitted.at_bound),
         )
@@ -511,7 +538,11 @@ def _with_one_more(
     return sorted(pool.values(), key=lambda h: -h.score)
 
 
-def _close(chosen: Hypothesis, other: Hypothesis) -> bool:
-    """Whether a rival is near enough, by linear algebra, to be fitted."""
-    behind = chosen.score - other.score
-    return rules.worth_refitting(behind=behind, gain=chosen.gain, rival_gain=other.gain)
+def _close(chosen: Hypothesis, other: Hypothesis, own: float) -> bool:
+    """Whether a rival is near enough, by linear algebra, to be fitted.
+
+    Args:
+      own: chi2 that the effect brings in whose place it would stand.
+    """
+    behind, less = chosen.score - other.score, chosen.gain - other.gain
+    return rules.worth_refitting(behind=behind, gain=own, rival_gain=own - less)
