@@ -17,6 +17,7 @@ from mjchair.diagnosis.fit.parameter_columns import nuisance_columns
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.replay import noise
 from mjchair.diagnosis.replay.derivatives import predictions
+from mjchair.diagnosis.replay.measured_motion import _smoothed
 from mjchair.diagnosis.replay.sensor_errors import SensorErrors
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.diagnosis.replay.window_states import track
@@ -90,3 +91,21 @@ def test_a_variant_too_light_for_its_rider_moves_less_mass_farther(push):
     # the simulator shows no person, and moves one nevertheless: the upper body is high
     half = bench.simulator.compile(moving(36.0).edit)
     assert half.body("rider_motion").ipos[2] + half.body("rider_motion").pos[2] > 0.85
+
+
+def test_a_body_at_rest_shakes_no_chair_and_one_that_moves_is_followed():
+    """Noise of 0.5 mm at 100 Hz, unsmoothed, is 12 m/s^2 of acceleration."""
+    rng, time = np.random.default_rng(0), np.arange(0.0, 8.0, 0.01)
+    noise = 5e-4 * rng.standard_normal(time.size)
+    sway = 0.03 * np.sin(2.0 * np.pi * 0.9 * time) + 0.01 * np.sin(2.0 * np.pi * 1.8 * time)
+    rate = 2.0 * np.pi * 0.9
+    gained = -(rate**2) * (0.03 * np.sin(rate * time) + 0.04 * np.sin(2.0 * rate * time))
+    for place, truth in ((noise, 0.0 * time), (sway + noise, gained)):
+        motion = _smoothed(time, place)
+        seen = motion.place_at(time)
+        acceleration = np.gradient(np.gradient(seen, time), time)
+        inside = (time > 0.3) & (time < 7.5)
+        assert np.std((acceleration - truth)[inside]) < 0.1
+    # beyond its end a motion keeps its speed: a stop would be a blow
+    after = motion.place_at(np.array([motion.time[-1], motion.time[-1] + 0.02]))
+    assert np.diff(after)[0] == pytest.approx(0.02 * motion.start(motion.time[-1])[1])

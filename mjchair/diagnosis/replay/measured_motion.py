@@ -13,14 +13,19 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import dst
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 from mjchair.diagnosis.data.study import Run
 
 Array = NDArray[np.float64]
-CUTOFF = 6.0  # Hz, below which a body moves: usual for markers on trunk and arms (Winter 2009)
-NYQUIST = 0.8  # of half the sample rate: a cutoff above it smooths nothing
+# Hz, that are tried as the end of what a body moves with: 6 Hz is usual for markers on trunk and
+# arms (Winter 2009)
+CUTOFFS = np.geomspace(0.5, 6.0, 30)
+NYQUIST = 0.8  # of half the sample rate: no cutoff is above it
+ORDER = 3  # of the filter, which runs once forward and once back
+END = 0.3  # s at both ends, through which a cubic goes
 FEWEST = 8  # samples
 
 
@@ -62,10 +67,40 @@ def _smoothed(time: Array, values: Array) -> Motion | None:
     if time.size < FEWEST:
         return None
     rate = 1.0 / float(np.median(np.diff(time)))
-    grid = np.arange(time[0], time[-1], 1.0 / rate)
+    grid = np.arange(time[0], time[-1] + 0.5 / rate, 1.0 / rate)
     even = np.interp(grid, time, place)
-    smooth = even
-    if NYQUIST * 0.5 * rate > CUTOFF:  # once forward and once back, so that nothing is late
-        low_pass = butter(2, CUTOFF, fs=rate, output="sos")
-        smooth = sosfiltfilt(low_pass, even, padlen=min(round(rate), even.size - 1))
-    return Motion(grid, smooth)
+    return Motion(grid, _without_noise(even, rate))
+
+
+def _without_noise(place: Array, rate: float) -> Array:
+    """Places (n,) m at a rate (Hz) without what is above a cutoff.
+
+    Generalized cross-validation chooses the cutoff: a body at rest is then at rest, and its noise
+    pushes no chair.
+    """
+    line = np.linspace(place[0], place[-1], place.size)
+    waves = dst(place - line, norm="ortho")
+    frequency = 0.5 * rate * np.arange(1, place.size + 1) / place.size
+
+    def error(cutoff: float) -> float:
+        passed = 1.0 / (1.0 + (frequency / cutoff) ** (2 * ORDER))
+        left = float((((1.0 - passed) * waves) ** 2).sum())
+        return left / float(1.0 - passed.mean()) ** 2
+
+    possible = CUTOFFS[NYQUIST * 0.5 * rate > CUTOFFS]
+    count = min(round(rate), place.size - 1)
+    if not possible.size or count < 2 * FEWEST:
+        return place
+    low_pass = butter(ORDER, min(possible, key=error), fs=rate, output="sos")
+    # turned about where the motion ends, not about its last sample with its noise
+    first, last = _end(place, rate), _end(place[::-1], rate)
+    before = 2.0 * first - place[count:0:-1]
+    after = 2.0 * last - place[-2 : -count - 2 : -1]
+    padded = sosfiltfilt(low_pass, np.r_[before, place, after], padlen=0)
+    return np.asarray(padded[count:-count])
+
+
+def _end(place: Array, rate: float) -> float:
+    """The first place of a motion, from a cubic through END."""
+    near = place[: max(FEWEST, round(END * rate))]
+    return float(np.polynomial.polynomial.polyfit(np.arange(near.size), near, 3)[0])
