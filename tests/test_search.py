@@ -107,7 +107,7 @@ def test_a_gap_is_laid_to_a_further_effect_only_once_the_first_is_fitted_anew(fi
     monkeypatch.setattr(search.hypotheses, "pairs", lambda *_: [BOTH])
     monkeypatch.setattr(search, "gap_after", lambda _, f: SimpleNamespace(exists=f is first))
     monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
-    monkeypatch.setattr(search, "_believable", lambda _: True)
+    monkeypatch.setattr(search, "believable", lambda _: True)
     monkeypatch.setattr(search, "_replacements", lambda *_: [])
     base = searching().base
     base.starts = ()
@@ -177,7 +177,7 @@ def test_where_no_second_effect_stands_no_third_is_tried(fits, monkeypatch):
     monkeypatch.setattr(search.hypotheses, "grown", lambda *_: [third])
     monkeypatch.setattr(search, "gap_after", lambda *_: SimpleNamespace(exists=True))
     monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
-    monkeypatch.setattr(search, "_believable", lambda f: len(f.variant.terms) == 1)
+    monkeypatch.setattr(search, "believable", lambda f: len(f.variant.terms) == 1)
     monkeypatch.setattr(search, "_replacements", lambda *_: [])
     base = searching().base
     base.starts = ()

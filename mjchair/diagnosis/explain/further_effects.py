@@ -32,7 +32,7 @@ from mjchair.diagnosis.explain.screening import (
     system_around,
     with_noise,
 )
-from mjchair.diagnosis.explain.search import Search
+from mjchair.diagnosis.explain.search import Search, believable
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.bounded import Reduced
@@ -133,7 +133,7 @@ def _promising(base: Base, here: Explained, reduced: Reduced) -> list[tuple[Hypo
 def _fitted(
     base: Base, here: Explained, bench: Bench, more: Hypothesis, reduced: Reduced
 ) -> Explained | None:
-    """The explanation with more effects; None: no chair can be so.
+    """The explanation with more effects; None: no chair can be so, or a size is not determined.
 
     Args:
       bench: to fit with. reduced: linear algebra around `here`, which tells where to begin.
@@ -144,6 +144,8 @@ def _fitted(
         start = replace(here.fitted.variant, terms=terms)
         fitted = refit(bench, start, here.fitted.track, columns)
     except (MjchairError, np.linalg.LinAlgError):
+        return None
+    if not believable(fitted):
         return None
     return _left(base, (*here.starts, *more.starts), fitted)
 

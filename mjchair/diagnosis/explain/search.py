@@ -190,7 +190,7 @@ class Search:
     def believed(self, hypothesis: Hypothesis, best: Tried | None = None) -> Tried | None:
         """The fit, where every parameter is off its bounds and known better than beforehand."""
         tried = self.fit(hypothesis, best)
-        if tried is None or _believable(tried.fitted):
+        if tried is None or believable(tried.fitted):
             return tried
         self._note(
             f"{' and '.join(hypothesis.keys)} is no answer: a number of it is not determined"
@@ -261,7 +261,7 @@ class Search:
         for _ in range(SWAPS):
             others = [Tried(r.hypothesis, r.fitted) for group in rivals for r in group]
             better = min(
-                (o for o in others if _believable(o.fitted)),
+                (o for o in others if believable(o.fitted)),
                 key=attrgetter("price"),
                 default=chosen,
             )
@@ -449,7 +449,7 @@ def _of(hypothesis: Hypothesis, fits: Sequence[Rival]) -> Fitted | None:
     return next((t.fitted for t in fits if t.hypothesis.starts == hypothesis.starts), None)
 
 
-def _believable(fitted: Fitted) -> bool:
+def believable(fitted: Fitted) -> bool:
     """Whether every size is off its bounds and known better than beforehand."""
     sized = [(key, p) for term in fitted.variant.terms for key, p in term.parameters if p.sized]
     return not fitted.at_bound and all(
