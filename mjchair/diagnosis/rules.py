@@ -36,6 +36,9 @@ WORTH = 15.0  # chi2 that a further effect must bring besides the penalty of its
 LINEAR = 0.1  # share of its gain by which the linear promise of a hypothesis may be wrong
 NEXT = 0.1  # share of the best linear gain by which a hypothesis that is fitted too may be behind
 TIE = 6.0  # chi2 within which hypotheses fit alike
+# of the gain of all: what forms that are 4.5 % wrong leave, so less is no further effect
+# (assumption; the rocking on its tires of a chair that is a little stiffer leaves as much)
+LEFT_BY_FORM = 0.002
 SURE = 6.0  # standard errors beyond which an effect is not tried without
 SHORT = 0.1  # share of the promise of the linear fit: a fit that misses more starts again elsewhere
 # the gap
@@ -224,14 +227,25 @@ def needed(parameters: int) -> float:
     return PENALTY * parameters + WORTH
 
 
-def worth_adding(*, gained: float, parameters: int, held: float) -> bool:
+def beyond_form(*, own: float, gain: float) -> bool:
+    """Whether an effect brings more than what the forms of all effects leave.
+
+    Args:
+      own: chi2 that it brings beside the others. gain: that all bring together.
+    """
+    return own >= LEFT_BY_FORM * gain
+
+
+def worth_adding(*, gained: float, parameters: int, held: float, gain: float) -> bool:
     """Whether a larger hypothesis brings enough, on its own evidence.
 
     Args:
+      gain: chi2 that it brings in all.
       gained: chi2 that it brings more. parameters: that it has more.
       held: chi2 that it brings more on each run when it is fitted to the others.
     """
-    return gained >= needed(parameters) and held >= HELD
+    enough = gained >= needed(parameters) and beyond_form(own=gained, gain=gain)
+    return enough and held >= HELD
 
 
 def worth_trying(*, score: float, best: float, gain: float) -> bool:

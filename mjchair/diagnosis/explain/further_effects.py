@@ -121,13 +121,38 @@ def _promising(base: Base, here: Explained, reduced: Reduced) -> list[tuple[Hypo
         options += hypotheses.pairs(reduced, free)[:LOOKED]
     own = effects_of(base, here.fitted)
     weighed = []
+    brought = _brought(base, here, reduced)
     for h in options:
+        if not _beyond_form(reduced, h, brought + h.gain):
+            continue
         columns: dict[ColumnId, Column] = {**own, **{c: base.columns[c] for c in h.columns}}
         bench, deviance = _noise(base, here.fitted, columns)
         if noise_shown.loudness(bench) < PROMISED * noise_shown.loudness(here.bench):
             weighed.append((here.price - deviance - _penalty((*here.starts, *h.starts)), h, bench))
     most = max((earns for earns, *_ in weighed), default=0.0)
     return [(h, b) for earns, h, b in weighed if earns > 0.0 and earns > (1.0 - LINEAR) * most]
+
+
+def _brought(base: Base, here: Explained, reduced: Reduced) -> float:
+    """Chi2 that the effects bring which are there, of a chair that is hardly shaken.
+
+    Args:
+      reduced: linear algebra of that chair around their fit.
+    """
+    plain, bench = base.plain, noise_shown.hushed(here.bench)
+    system = bench.system(plain.track, plain.columns, len(plain.columns), plain.variant)
+    return max(bounded.reduce(system, bench.windows).total - reduced.total, 0.0)
+
+
+def _beyond_form(reduced: Reduced, more: Hypothesis, gain: float) -> bool:
+    """Whether each of the further effects brings more than the forms of all leave.
+
+    Args:
+      gain: chi2 that all effects bring.
+    """
+    fewer = [hypotheses.weigh(reduced, [s for s in more.starts if s is not own]).gain
+             for own in more.starts]  # fmt: skip
+    return all(rules.beyond_form(own=more.gain - less, gain=gain) for less in fewer)
 
 
 def _fitted(

@@ -205,6 +205,7 @@ class Search:
             gained=one.total - other.total,
             parameters=more.hypothesis.free - best.hypothesis.free,
             held=held,
+            gain=gain(self.base, other),
         )
 
     def without_needless(self, tried: Tried) -> Tried:
