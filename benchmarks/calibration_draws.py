@@ -345,10 +345,6 @@ class LinearSearch(search.Search):
         """The fit itself: a linear system is the same around any chair."""
         return tried.fitted
 
-    def near_itself(self, chosen: search.Tried) -> search.Tried:
-        """The chosen hypothesis itself, for the same reason."""
-        return chosen
-
 
 def _fit(base: Any, hypothesis: Hypothesis) -> Any:
     """What a fit of this hypothesis is, by linear algebra."""

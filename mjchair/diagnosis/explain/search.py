@@ -20,7 +20,7 @@ from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.left_out import held_out, with_terms
 from mjchair.diagnosis.explain.near_fit import near_fit
-from mjchair.diagnosis.explain.screening import Base, Found, Say, gap_after
+from mjchair.diagnosis.explain.screening import Base, Say, gap_after
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
 from mjchair.diagnosis.fit.variant import Term, Variant
@@ -56,7 +56,7 @@ def choose(base: Base, gap: Gap, say: Say, search: Search | None = None) -> Choi
     best, after = search.found() if base.found else _grown(search)
     if best is None:
         return None
-    best, rivals = search.against_rivals(search.near_itself(search.without_needless(best)))
+    best, rivals = search.against_rivals(search.without_needless(best))
     say("the last fit, with everything made anew around it")
     fitted = search.anew(best)
     after[-1] = gap_after(base, fitted)
@@ -231,18 +231,6 @@ class Search:
             if rules.can_be_dropped(lost=lost, parameters=parameters):
                 return self.without_needless(other)
         return tried
-
-    def near_itself(self, chosen: Tried) -> Tried:
-        """The chosen hypothesis, and from here on all linear algebra around its fit.
-
-        Beside a large effect, the algebra around a chair without any is wrong by more than a small
-        one brings.
-        """
-        starts = chosen.hypothesis.starts
-        if len(starts) == 1 or self.near is not None:
-            return chosen
-        self.near = near_fit(self.base, Found(starts, self.anew(chosen)))
-        return Tried(self.weigh(starts), chosen.fitted)
 
     def own_gain(self, chosen: Tried, start: Start) -> float:
         """Chi2 that one effect of the chosen hypothesis brings beside the others."""
