@@ -69,13 +69,13 @@ def without_hidden(search: Search) -> Search:
     if noise_shown.loudness(base.bench) <= LOUD:
         return search
     search.say("what passes for noise")
-    first = here = _first(search)
+    here = _first(search)
     while len(here.starts) < rules.MOST and noise_shown.loudness(here.bench) > LOUD:
         further = _further(base, here)
         if further is None:
             break
         here = further
-    if here is first:
+    if not here.starts or not _is_quieter(here.bench, base.bench):
         return search
     quieter = with_noise(base, here.bench)
     columns = nuisances_of(base, here.fitted)
@@ -94,7 +94,7 @@ def _first(search: Search) -> Explained:
     if tried is None:
         return plain
     alone = _left(base, best.starts, search.anew(tried))
-    return alone if alone.price < plain.price else plain
+    return _agreed(base, alone) if alone.price < plain.price else plain
 
 
 def _further(base: Base, here: Explained) -> Explained | None:
@@ -105,8 +105,12 @@ def _further(base: Base, here: Explained) -> Explained | None:
     if best.price >= here.price:
         return None
     best = _agreed(base, best)
-    quiet = HALF * noise_shown.loudness(here.bench)
-    return best if noise_shown.loudness(best.bench) < quiet else None
+    return best if _is_quieter(best.bench, here.bench) else None
+
+
+def _is_quieter(one: Bench, other: Bench) -> bool:
+    """Whether what shakes the chair has less than half of its power with one noise."""
+    return noise_shown.loudness(one) < HALF * noise_shown.loudness(other)
 
 
 def _promising(base: Base, here: Explained, reduced: Reduced) -> list[tuple[Hypothesis, Bench]]:

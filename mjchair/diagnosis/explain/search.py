@@ -20,7 +20,7 @@ from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.left_out import held_out, with_terms
 from mjchair.diagnosis.explain.near_fit import near_fit
-from mjchair.diagnosis.explain.screening import Base, Say, gap_after
+from mjchair.diagnosis.explain.screening import Base, Found, Say, gap_after
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
 from mjchair.diagnosis.fit.variant import Term, Variant
@@ -84,9 +84,9 @@ def _grown(search: Search) -> tuple[Tried | None, list[Gap]]:
         if size == rules.MOST:
             bases = [h.starts for h in options[1][:3]]
             options.append(hypotheses.grown(base.reduced, base.starts, bases))
-        if not options[size - 1] or options[size - 1][0].score <= 0.0:
-            break
-        top = search.best_of(options[size - 1], patient=best is None)
+        top = None if best is None else search.beside(best)
+        if top is None or top[1].exists:  # perhaps the first effect stands in for two others
+            top = _better(top, search.best_of(options[size - 1], patient=best is None))
         if top is None:
             if best is None:
                 continue
@@ -100,6 +100,13 @@ def _grown(search: Search) -> tuple[Tried | None, list[Gap]]:
         if not left.exists:
             break
     return best, after
+
+
+def _better(
+    one: tuple[Tried, Gap] | None, other: tuple[Tried, Gap] | None
+) -> tuple[Tried, Gap] | None:
+    """The one with the lower price; None: there is neither."""
+    return min((t for t in (one, other) if t is not None), key=lambda t: t[0].price, default=None)
 
 
 class Search:
@@ -134,12 +141,28 @@ class Search:
         after = [gap_after(self.base, best.fitted)]
         while after[-1].exists and len(best.hypothesis.starts) < rules.MOST:
             options = _with_one_more(self, best.hypothesis.starts)
-            top = self.best_of(options, patient=False) if options else None
+            top = self.best_of(options, patient=False)
             if top is None or not self.is_worth(best, top[0]):
                 break
             best = top[0]
             after.append(top[1])
         return best, after
+
+    def beside(self, best: Tried) -> tuple[Tried, Gap] | None:
+        """The best hypothesis with one effect more, by the linear algebra around a fit.
+
+        Around a chair without effects, a large effect is wrong by more than a small one brings: a
+        payload of 40 kg hides that the centre of mass is 80 mm aside.
+
+        Args:
+          best: whose effects stay; everything is made anew around it.
+        """
+        starts = best.hypothesis.starts
+        self.near = near_fit(self.base, Found(starts, self.anew(best)))
+        try:
+            return self.best_of(_with_one_more(self, starts), patient=False)
+        finally:
+            self.near = None
 
     def weigh(self, starts: Sequence[Start]) -> Hypothesis:
         """The hypothesis by linear algebra: around the effects that were found, if any."""
@@ -163,6 +186,8 @@ class Search:
         Args:
           patient: whether, where none of these can be, the list is gone on along.
         """
+        if not options or options[0].score <= 0.0:
+            return None
         first = _commonest(self, options)
         top = self.believed(first)
         if top is not None:
@@ -225,6 +250,8 @@ class Search:
             ):
                 continue
             other = self.fit(fewer)
+            if fitted.sigmas[start.effect.key] < rules.SIGMAS:
+                other = self._from_more(fewer, fitted, other)
             if other is None:
                 continue
             lost = self.anew(other).total - fitted.total
@@ -240,6 +267,21 @@ class Search:
         if not others:
             return whole
         return float(np.clip(hypothesis.gain - self.weigh(others).gain, 0.0, max(whole, 0.0)))
+
+    def _from_more(self, fewer: Hypothesis, more: Fitted, own: Tried | None) -> Tried | None:
+        """The fit of fewer effects: its own, or a better one that begins where more of them ended.
+
+        An effect that is hardly there may have helped the fit past the place where it was stuck.
+        """
+        keys = set(fewer.keys)
+        terms = tuple(t for t in more.variant.terms if t.effect.key in keys)
+        fitted = self._made_anew(replace(more.variant, terms=terms), more.track)
+        if fitted is None or (own is not None and self.anew(own).total <= fitted.total):
+            return own
+        found = Tried(fewer, fitted)
+        for known in (self.tried, self.again):
+            known.insert(0, found)
+        return found
 
     def against_rivals(self, chosen: Tried) -> tuple[Tried, list[list[Rival]]]:
         """The best of the chosen hypothesis and what could stand in its places, with its rivals.
