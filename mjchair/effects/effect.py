@@ -39,6 +39,8 @@ class Parameter:
       sized: False for a number that says where or when an effect acts, not how large it is.
       cautious: the most that one step of a fit may move it.
       each_run: whether it is new in every run, as a phase is.
+      whole: sizes at which a chair does what no small change foretells: a tire slides, a wheel
+        shimmies. Where small changes explain nothing, fits begin at these too.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Parameter:
     sized: bool = True
     cautious: float = math.inf
     each_run: bool = False
+    whole: tuple[float, ...] = ()
 
     @property
     def change(self) -> float:

@@ -16,7 +16,9 @@ def edit(spec: mujoco.MjSpec, length: float) -> None:
 
 EFFECT = Effect(
     name="relaxation_length",
-    parameters=(Parameter("length", "m", 0.1, -0.03, 1.0),),
+    parameters=(
+        Parameter("length", "m", 0.1, -0.03, 1.0, whole=(0.04, 0.06, 0.08, 0.1, 0.13, 0.18)),
+    ),
     signature="Fy lags, in proportion to omega sigma / v",
     source="car tires half a metre, bicycle tires 0.1-0.2 m (Pacejka 2006)",
     edit=edit,

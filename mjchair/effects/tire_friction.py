@@ -16,7 +16,11 @@ def edit(spec: mujoco.MjSpec, factor: float) -> None:
 
 EFFECT = Effect(
     name="tire_friction",
-    parameters=(Parameter("factor", "1", 0.4, 0.02, 2.0, 1.0, probe=1.0),),
+    parameters=(
+        Parameter(
+            "factor", "1", 0.4, 0.02, 2.0, 1.0, probe=1.0, whole=(0.6, 0.45, 0.33, 0.25, 0.18)
+        ),
+    ),
     signature="the peak only; visible where a tire slides",
     source="wet or dusty floors 0.2-0.5 against 0.8",
     edit=edit,

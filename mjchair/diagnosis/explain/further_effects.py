@@ -20,7 +20,7 @@ from operator import attrgetter
 import numpy as np
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import hypotheses, noise_shown
+from mjchair.diagnosis.explain import hypotheses, noise_shown, whole_sizes
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.screening import (
@@ -44,6 +44,7 @@ from mjchair.errors import MjchairError
 HALF = 0.5  # of the power of what shakes the chair: effects that take less are no matter of noise
 PROMISED = 0.7  # of that power: what linear algebra leaves at most of it
 LOOKED = 3  # further single effects, and pairs, that are weighed against noise
+DEAFENING = 0.5  # of the most that is believed to shake the chair: then something large is missing
 ROUNDS = 4  # of fit and noise, at most
 SETTLED = 5.0  # deviance that a further round changes no more
 LINEAR = 0.1  # share of what effects earn by which linear algebra may be wrong
@@ -86,15 +87,16 @@ def without_hidden(search: Search) -> Search:
 def _first(search: Search) -> Explained:
     """The best effect with everything made anew around it, or none where it earns nothing."""
     base = search.base
-    plain = _left(base, (), base.plain)
+    known = [_left(base, (), base.plain)]
     best = search.best_single()
-    if best is None or best.gain < rules.needed(best.free):
-        return plain
-    tried = search.fit(best)
-    if tried is None:
-        return plain
-    alone = _left(base, best.starts, search.anew(tried))
-    return _agreed(base, alone) if alone.price < plain.price else plain
+    tried = search.fit(best) if best and best.gain > rules.needed(best.free) else None
+    if best and tried:
+        known.append(_left(base, best.starts, search.anew(tried)))
+    if min(noise_shown.loudness(e.bench) for e in known) > DEAFENING:
+        search.say("effects of whole sizes")
+        known += [_left(base, (s,), f) for s, f in whole_sizes.fits(base)]
+    first = min(known, key=attrgetter("price"))
+    return _agreed(base, first) if first.starts else first
 
 
 def _further(base: Base, here: Explained) -> Explained | None:

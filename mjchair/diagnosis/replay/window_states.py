@@ -7,6 +7,7 @@ simulation itself.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 import mujoco
@@ -110,12 +111,14 @@ def track(
     errors: SensorErrors | None = None,
     before: Track | None = None,
     anew: bool = False,
+    only: Collection[int] | None = None,
 ) -> Track:
     """Fit the slow state of every window.
 
     Args:
       model: of any size; states are those of the base model. before: a track to start from, of a
         model that is not far; its answers to the slow state are kept, unless made `anew`.
+      only: windows to fit; the others stay as they were `before`. None: all.
     """
     chair = simulator.chair
     coarse = simulator.coarsened(model)
@@ -124,12 +127,13 @@ def track(
     count = len(simulator.windows)
     by_index: dict[int, list[int]] = {}
     for i, w in enumerate(simulator.windows):
-        by_index.setdefault(w.index, []).append(i)
+        if only is None or i in only:
+            by_index.setdefault(w.index, []).append(i)
     states = _begun(simulator) if before is None else [s.copy() for s in before.states]
-    predicted: list[Array] = [np.empty(0)] * count
+    predicted = [np.empty(0)] * count if before is None else list(before.predicted)
     kept = before is not None and not anew
-    slow: list[Array] = list(before.slow) if before and kept else [np.empty(0)] * count
-    traces: list[dict[str, Array]] = [{}] * count
+    slow = [np.empty(0)] * count if before is None else list(before.slow)
+    traces = [{}] * count if before is None else list(before.trace)
     with installed():
         for index in sorted(by_index):
             members = by_index[index]

@@ -1,0 +1,104 @@
+"""Effects of a size at which a chair does what no small change foretells: it slides or shimmies.
+
+In: the screened columns. Out: fits that begin at such a size, where the size alone already brings
+more than it costs.
+
+Linear algebra is blind to these: a tire with a little less friction does nothing until it slides,
+and a relaxation length does little until the wheels shimmy. So the windows that disagree most are
+simulated at a few sizes (`Parameter.whole`), their states fitted anew at each, and then between the
+best and its neighbours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain.candidates import Start
+from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.nonlinear import Fitted, refit
+from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.diagnosis.replay.window_states import Track, track
+from mjchair.effects.effect import Parameter
+from mjchair.errors import MjchairError
+
+LOOKED = 4  # windows, those that disagree most
+BETWEEN = 2  # times that the best size is compared with the middles to its neighbours
+
+
+def fits(base: Base) -> Iterator[tuple[Start, Fitted]]:
+    """Fits of single effects that begin at whole sizes."""
+    seen = set()
+    for start in base.starts:
+        p = next((p for p in start.effect.fitted if p.whole), None)
+        if p is None or start.effect.key in seen:
+            continue
+        seen.add(start.effect.key)
+        begin = _best_size(base, start, p)
+        if begin is None:
+            continue
+        try:
+            yield start, refit(base.bench, begin, base.around.track)
+        except (MjchairError, np.linalg.LinAlgError):
+            continue  # this chair cannot have it
+
+
+def _best_size(base: Base, start: Start, parameter: Parameter) -> Variant | None:
+    """The chair with the best size of an effect; None: no size brings more than it costs."""
+    windows = _worst_windows(base)
+    neutral = start.effect.neutral()
+    totals = {parameter.neutral: _chi2(base, base.plain.variant, base.plain.track, windows)}
+    variants: dict[float, Variant] = {}
+
+    def look(size: float) -> None:
+        term = Term(start.effect, {**neutral, parameter.name: size}, start.free)
+        variants[size] = replace(base.around.variant, terms=(term,))
+        totals[size] = _at(base, variants[size], windows)
+
+    for size in parameter.whole:
+        look(size)
+    best = min(totals, key=totals.__getitem__)
+    for _ in range(BETWEEN if best != parameter.neutral else 0):
+        for size in _middles(sorted(totals), best):
+            look(size)
+        best = min(totals, key=totals.__getitem__)
+    gained = totals[parameter.neutral] - totals[best]
+    return variants[best] if gained > rules.needed(len(start.free)) else None
+
+
+def _worst_windows(base: Base) -> list[int]:
+    """The windows that may be fitted to and disagree most with the chair without effects."""
+    order = np.argsort(-base.plain.chi2)
+    return [int(i) for i in base.bench.windows[order[:LOOKED]]]
+
+
+def _middles(sizes: Sequence[float], best: float) -> list[float]:
+    """The middles between a size and those next to it."""
+    at = sizes.index(best)
+    near = [sizes[k] for k in (at - 1, at + 1) if 0 <= k < len(sizes)]
+    return [0.5 * (best + other) for other in near]
+
+
+def _at(base: Base, variant: Variant, windows: Sequence[int]) -> float:
+    """Chi2 of windows of a variant, their states fitted anew; infinite where no chair is so."""
+    simulator = base.bench.simulator
+    errors = variant.sensor_errors(simulator.channels)
+    before = base.around.track
+    try:
+        model = simulator.compile(variant.edit)
+        here = track(simulator, model, base.bench.noise, errors, before, anew=True, only=windows)
+    except MjchairError:
+        return np.inf
+    if not all(np.isfinite(here.predicted[i]).any() for i in windows):
+        return np.inf
+    return _chi2(base, variant, here, windows)
+
+
+def _chi2(base: Base, variant: Variant, here: Track, windows: Sequence[int]) -> float:
+    """Chi2 of windows with what is roughly known put where it fits best, priors included."""
+    system = base.bench.system(here, base.nuisances, len(base.nuisances), variant)
+    return bounded.reduce(system, windows).total
