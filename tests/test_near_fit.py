@@ -79,10 +79,13 @@ def test_what_is_new_begins_at_its_linear_value_and_the_rest_stays(problem):
     assert terms[1].values["size"] == pytest.approx(best[1], rel=1e-6)
 
 
+SMALL = SimpleNamespace(effect=SimpleNamespace(parameters=()))
+
+
 def explained(count, power, price):
     fitted = SimpleNamespace(variant=None, track=None, columns={})
     return SimpleNamespace(
-        starts=("effect",) * count, fitted=fitted, bench=SimpleNamespace(power=power), price=price
+        starts=(SMALL,) * count, fitted=fitted, bench=SimpleNamespace(power=power), price=price
     )
 
 

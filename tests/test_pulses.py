@@ -11,15 +11,17 @@ from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.diagnosis.replay.window_states import track
 from mjchair.effects import rider_motion
 from mjchair.measurement.trial import Trial
+from mjchair.model import parts
 from mjchair.simulation.initial import Initial
+from mjchair.tire import block
 
 CHANNELS = ("left_wheel_speed", "right_wheel_speed", "imu_gyro.z")
 
 
 @pytest.fixture(scope="module")
 def coast():
-    """Windows of a coast of 2 s, during which a person sits still."""
-    run = mjchair.simulate(mjchair.load_spec("manual"), None, 2.0, initial={"speed": 1.0})
+    """Windows of a coast of 4 s, during which a person sits still."""
+    run = mjchair.simulate(mjchair.load_spec("manual"), None, 4.0, initial={"speed": 1.0})
     still = {"rider_motion": np.zeros(run.time.size)}
     measured = {c: np.asarray(run.channels[c]) for c in CHANNELS}
     trial = Trial("coast", run.time, measured, None, still)
@@ -40,3 +42,17 @@ def test_a_pulse_acts_on_the_same_joint_of_a_chair_with_more_joints(coast):
     for pulse, one, other in zip(asked, rigid, moving, strict=True):
         assert np.abs(one).max() > 0.0
         assert np.abs(other - one).max() < 0.05 * np.abs(one).max(), pulse.force
+
+
+def test_windows_that_are_not_asked_for_stay_as_they_were(coast):
+    """A heavier chair's states in one window alone are those that it has in a track of all."""
+    simulator, found = coast
+    assert len(simulator.windows) > 1
+    model = simulator.compile(lambda spec: parts.add_to_tires(spec, block.ROLLING_RESISTANCE, 0.01))
+    known = noise.estimate(simulator.study)
+    every = track(simulator, model, known, before=found, anew=True)
+    one = track(simulator, model, known, before=found, anew=True, only=[0])
+    assert (one.predicted[0] == every.predicted[0]).all()
+    assert (one.states[0].qvel == every.states[0].qvel).all()
+    assert one.predicted[1] is found.predicted[1] and one.slow[1] is found.slow[1]
+    assert not np.array_equal(every.predicted[1], found.predicted[1])

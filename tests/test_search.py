@@ -124,6 +124,8 @@ def test_an_effect_that_brings_nothing_once_all_is_made_anew_is_dropped(fits, mo
             ("motor+rolling", "as given"): fit(1105.0, "rolling", "motor"),
             ("motor+rolling", "track of motor+rolling"): fit(1104.0, "rolling", "motor"),
             ("motor", "as given"): None,
+            ("motor", "track of motor+rolling"): None,
+            ("rolling", "track of motor+rolling"): fit(1115.0, "rolling"),
         }
     )
     monkeypatch.setattr(
@@ -132,6 +134,55 @@ def test_an_effect_that_brings_nothing_once_all_is_made_anew_is_dropped(fits, mo
     looking = searching()
     chosen = looking.without_needless(looking.fit(BOTH))
     assert chosen.hypothesis.keys == ("rolling",)
+
+
+def test_an_effect_that_helped_a_stuck_fit_is_dropped(fits, monkeypatch):
+    """Alone, rolling resistance is stuck at 1400; from where both ended it fits as well as both."""
+    fits.answers.update(
+        {
+            ("rolling", "as given"): fit(1400.0, "rolling"),
+            ("rolling", "track of rolling"): fit(1400.0, "rolling"),
+            ("motor+rolling", "as given"): fit(1105.0, "rolling", "motor"),
+            ("motor+rolling", "track of motor+rolling"): fit(1104.0, "rolling", "motor"),
+            ("motor", "as given"): None,
+            ("motor", "track of motor+rolling"): None,
+            ("rolling", "track of motor+rolling"): fit(1106.0, "rolling"),
+        }
+    )
+    monkeypatch.setattr(
+        search.hypotheses, "weigh", lambda _, starts: Hypothesis(tuple(starts), 870.0, 850.0)
+    )
+    looking = searching()
+    looking.fit(ONE)
+    chosen = looking.without_needless(looking.fit(BOTH))
+    assert chosen.hypothesis.keys == ("rolling",) and chosen.fitted.total == 1106.0
+    assert looking.fit(ONE).fitted.total == 1106.0
+
+
+def test_a_second_effect_is_weighed_around_the_fit_of_the_first(fits, monkeypatch):
+    """Around the chair without effects, the pair that is right is not even listed."""
+    fits.answers.update(
+        {
+            ("rolling", "as given"): fit(1500.0, "rolling"),
+            ("rolling", "track of rolling"): fit(1500.0, "rolling"),
+            ("motor+rolling", "track of motor+rolling"): fit(1110.0, "rolling", "motor"),
+        }
+    )
+    both = fit(1110.0, "rolling", "motor")
+    near = SimpleNamespace(refit=lambda starts, rounds: both)
+    monkeypatch.setattr(search, "near_fit", lambda base, found: near)
+    monkeypatch.setattr(search.hypotheses, "singles", lambda *_: [ONE])
+    monkeypatch.setattr(search.hypotheses, "pairs", lambda *_: [])
+    monkeypatch.setattr(search, "_with_one_more", lambda *_: [BOTH])
+    monkeypatch.setattr(search, "gap_after", lambda _, f: SimpleNamespace(exists=f is not both))
+    monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
+    monkeypatch.setattr(search, "_believable", lambda _: True)
+    monkeypatch.setattr(search.Search, "is_worth", lambda *_: True)
+    looking = searching()
+    looking.base.starts = ()
+    best, after = search._grown(looking)
+    assert best.hypothesis is BOTH and best.fitted is both
+    assert [gap.exists for gap in after] == [True, False] and looking.near is None
 
 
 def test_a_fit_that_cannot_come_near_the_best_is_not_started_again(fits):
@@ -179,6 +230,8 @@ def test_where_no_second_effect_stands_no_third_is_tried(fits, monkeypatch):
     monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
     monkeypatch.setattr(search, "believable", lambda f: len(f.variant.terms) == 1)
     monkeypatch.setattr(search, "_replacements", lambda *_: [])
+    monkeypatch.setattr(search, "near_fit", lambda *_: None)
+    monkeypatch.setattr(search, "_with_one_more", lambda *_: [])
     base = searching().base
     base.starts = ()
     chosen = search.choose(base, SimpleNamespace(exists=True), lambda line: None)

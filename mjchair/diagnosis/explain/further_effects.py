@@ -76,7 +76,9 @@ def without_hidden(search: Search) -> Search:
         if further is None:
             break
         here = further
-    if not here.starts or not _is_quieter(here.bench, base.bench):
+    # small changes do not lead to an effect of a whole size: the search would not find it again
+    whole = any(p.whole for s in here.starts for p in s.effect.parameters)
+    if not here.starts or not (whole or _is_quieter(here.bench, base.bench)):
         return search
     quieter = with_noise(base, here.bench)
     columns = nuisances_of(base, here.fitted)
