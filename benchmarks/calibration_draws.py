@@ -341,6 +341,14 @@ class LinearSearch(search.Search):
         """The fit itself: a linear one never goes astray."""
         return fitted
 
+    def beside(self, best: Any) -> Any:
+        """None: around the fit the algebra is what it is around the chair without effects."""
+        return None
+
+    def _from_more(self, fewer: Hypothesis, more: Any, own: Any) -> Any:
+        """The fit's own: a linear one is never stuck."""
+        return own
+
     def anew(self, tried: Any) -> Any:
         """The fit itself: a linear system is the same around any chair."""
         return tried.fitted
