@@ -44,7 +44,7 @@ from mjchair.errors import MjchairError
 HALF = 0.5  # of the power of what shakes the chair: effects that take less are no matter of noise
 PROMISED = 0.7  # of that power: what linear algebra leaves at most of it
 LOOKED = 3  # further single effects, and pairs, that are weighed against noise
-DEAFENING = 0.5  # of the most that is believed to shake the chair: then something large is missing
+SHAKEN = 0.1  # of the most that is believed to shake the chair: then something large may be missing
 ROUNDS = 4  # of fit and noise, at most
 SETTLED = 5.0  # deviance that a further round changes no more
 LINEAR = 0.1  # share of what effects earn by which linear algebra may be wrong
@@ -94,7 +94,7 @@ def _first(search: Search) -> Explained:
     tried = search.fit(best) if best and best.gain > rules.needed(best.free) else None
     if best and tried:
         known.append(_left(base, best.starts, search.anew(tried)))
-    if min(noise_shown.loudness(e.bench) for e in known) > DEAFENING:
+    if min(noise_shown.loudness(e.bench) for e in known) > SHAKEN:
         search.say("effects of whole sizes")
         known += [_left(base, (s,), f) for s, f in whole_sizes.fits(base)]
     first = min(known, key=attrgetter("price"))
