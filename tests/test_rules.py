@@ -197,6 +197,10 @@ def test_what_an_answer_leaves_is_said():
         # an answer that is rather not there is none, unless something shows
         ({"force": 4.0, "excess": 1.9, "said": Verdict.AMBIGUOUS, "probability": 0.49}, False),
         ({"force": 4.0, "excess": 2.1, "said": Verdict.AMBIGUOUS, "probability": 0.49}, True),
+        # where nothing is the most probable, the residual must show as clearly as a gap does
+        ({"force": 4.0, "excess": 4.9, "nothing": True}, False),
+        ({"force": 4.0, "excess": 5.1, "nothing": True}, True),
+        ({"force": 4.0, "excess": 4.9, "nothing": True, "said": Verdict.NAMED}, True),
     ],
 )
 def test_what_is_below_the_limit_does_not_matter(changes, matters):

@@ -15,6 +15,7 @@ from scipy import stats
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.evidence import evidence, missing_forces
 from mjchair.diagnosis.explain import event, hypotheses, missing_force
+from mjchair.diagnosis.explain.calibration import NONE
 from mjchair.diagnosis.explain.choice import Choice, closure, gain
 from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.explain.gap import Gap, forces_left
@@ -72,6 +73,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         said=said,
         sigmas=min(stands.sigmas, default=0.0) if stands else 0.0,
         probability=of_any(probability, _standing_keys(choice)) if choice else 0.0,
+        nothing=max(probability, key=probability.__getitem__) == NONE,
     ):
         said = Verdict.NONE
     named = choice if said in (Verdict.NAMED, Verdict.AMBIGUOUS) else None

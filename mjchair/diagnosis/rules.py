@@ -181,7 +181,7 @@ def more_missing(choice: Standing, walls: int) -> bool:
 
 def matters(
     *, force: float, limit: float, gap: float, excess: float, told: bool, said: Verdict,
-    sigmas: float, probability: float,
+    sigmas: float, probability: float, nothing: bool = False,
 ) -> bool:  # fmt: skip
     """Whether a gap is one that matters.
 
@@ -192,11 +192,14 @@ def matters(
         is rather not there, does not matter, however large the force of a test that stands out.
       told: whether the person who asks gave the limit.
       probability: that an effect of the answer is there.
+      nothing: whether that nothing is missing is more probable than any one explanation; then the
+        whole residual must show as clearly as a gap does.
       sigmas: of the least certain effect. Without a limit that was told, what is CERTAIN
         matters whatever its size, and a gap of twice the noise is one though no force goes with it.
     """
     answered = said != Verdict.UNKNOWN and probability >= LIKELY
-    if not answered and not told and excess < SHOWS and gap < SMALL_GAP:
+    shows = LEAST if nothing else SHOWS
+    if not answered and not told and excess < shows and gap < SMALL_GAP:
         return False
     if force >= limit or said == Verdict.NONE:
         return True
