@@ -176,7 +176,7 @@ def test_a_second_effect_is_weighed_around_the_fit_of_the_first(fits, monkeypatc
     monkeypatch.setattr(search, "_with_one_more", lambda *_: [BOTH])
     monkeypatch.setattr(search, "gap_after", lambda _, f: SimpleNamespace(exists=f is not both))
     monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
-    monkeypatch.setattr(search, "_believable", lambda _: True)
+    monkeypatch.setattr(search, "believable", lambda _: True)
     monkeypatch.setattr(search.Search, "is_worth", lambda *_: True)
     looking = searching()
     looking.base.starts = ()
