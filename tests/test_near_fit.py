@@ -118,6 +118,32 @@ def test_noise_gives_way_to_effects_that_earn_it(monkeypatch, power, price, quie
         assert found.starts == more.starts
 
 
+WHOLE = SimpleNamespace(effect=SimpleNamespace(parameters=(SimpleNamespace(whole=(0.3,)),)))
+
+
+@pytest.mark.parametrize(
+    ("start", "power", "adopted"),
+    [
+        (SMALL, 0.4, True),  # once it is fitted, what shook the chair is gone
+        (SMALL, 0.9, False),  # the search finds it again, with the noise as it was
+        (WHOLE, 0.9, True),  # which the search would not find
+    ],
+)
+def test_one_effect_is_what_the_search_begins_with(monkeypatch, start, power, adopted):
+    one = explained(1, power, 100.0)
+    one.starts = (start,)
+    monkeypatch.setattr(further_effects.noise_shown, "loudness", lambda bench: bench.power)
+    monkeypatch.setattr(further_effects, "_first", lambda _: one)
+    monkeypatch.setattr(further_effects, "_further", lambda *_: None)
+    monkeypatch.setattr(further_effects, "refit", lambda *_: "the fit")
+    monkeypatch.setattr(further_effects, "replace", lambda base, found: found)
+    monkeypatch.setattr(further_effects, "with_noise", lambda base, bench: bench)
+    monkeypatch.setattr(further_effects, "Search", lambda found, _: found)
+    base = SimpleNamespace(bench=SimpleNamespace(power=1.0), nuisances={})
+    search = SimpleNamespace(base=base, say=lambda _: None)
+    assert (further_effects.without_hidden(search) is not search) == adopted
+
+
 def test_a_chair_that_is_hardly_shaken_is_not_looked_at_again(monkeypatch):
     monkeypatch.setattr(further_effects.noise_shown, "loudness", lambda bench: bench)
     search = SimpleNamespace(base=SimpleNamespace(bench=0.5 * LOUD))
