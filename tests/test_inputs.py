@@ -46,6 +46,12 @@ def test_constant_drives_until_its_end_and_not_after(model):
     assert not out[:, 2].any()
 
 
+def test_values_over_time_are_no_constant(model):
+    line = r"left_wheel is 3 values; a constant control is one number.*mjchair\.Inputs"
+    with pytest.raises(MjchairError, match=line):
+        constant({"left_wheel": np.ones(3)}, 1.0)
+
+
 def test_a_prefix_from_attachment_is_tolerated(prefixed):
     out = constant({"right_wheel": 2.0}, 1.0).control_array(prefixed, [0.5])
     assert out.tolist() == [[0.0, 2.0, 0.0]]

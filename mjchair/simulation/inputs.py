@@ -191,10 +191,16 @@ def constant(controls: Mapping[str, float], duration: float) -> Inputs:
     """Controls that stay the same from 0 to `duration` (s).
 
     Raises:
-      MjchairError: a duration that is not positive, a control that is not finite.
+      MjchairError: a duration that is not positive, a control that is not one finite number.
     """
     if not duration > 0.0 or not np.isfinite(duration):
         raise MjchairError(f"duration is {duration:g} s; it must be positive")
+    for name, value in controls.items():
+        if np.ndim(value):
+            raise MjchairError(
+                f"{name} is {np.size(value)} values; a constant control is one number. For values "
+                "over time give mjchair.Inputs(time, {name: values})"
+            )
     values = {name: np.full(2, float(value)) for name, value in controls.items()}
     return Inputs(np.array([0.0, duration]), values, "constant")
 

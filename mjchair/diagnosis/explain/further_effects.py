@@ -44,9 +44,7 @@ from mjchair.errors import MjchairError
 HALF = 0.5  # of the power of what shakes the chair: effects that take less are no matter of noise
 PROMISED = 0.7  # of that power: what linear algebra leaves at most of it
 LOOKED = 3  # further single effects, and pairs, that are weighed against noise
-SHAKEN = (
-    0.25  # of the most power that is believed to shake the chair: something large may be missing
-)
+SHAKEN = 0.25  # of the most power that is believed: then something large may be missing
 ROUNDS = 4  # of fit and noise, at most
 SETTLED = 5.0  # deviance that a further round changes no more
 LINEAR = 0.1  # share of what effects earn by which linear algebra may be wrong
