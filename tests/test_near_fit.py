@@ -89,6 +89,20 @@ def explained(count, power, price):
     )
 
 
+def begun(monkeypatch, first):
+    """What the search begins with, where `first` is the best effect; None: with nothing."""
+    monkeypatch.setattr(further_effects.noise_shown, "loudness", lambda bench: bench.power)
+    monkeypatch.setattr(further_effects, "_first", lambda _: first)
+    monkeypatch.setattr(further_effects, "refit", lambda *_: "the fit")
+    monkeypatch.setattr(further_effects, "replace", lambda base, found: found)
+    monkeypatch.setattr(further_effects, "with_noise", lambda base, bench: bench)
+    monkeypatch.setattr(further_effects, "Search", lambda found, _: found)
+    base = SimpleNamespace(bench=SimpleNamespace(power=1.0), nuisances={})
+    search = SimpleNamespace(base=base, say=lambda _: None)
+    found = further_effects.without_hidden(search)
+    return None if found is search else found
+
+
 @pytest.mark.parametrize(
     ("power", "price", "quieter"),
     [
@@ -99,21 +113,13 @@ def explained(count, power, price):
 )
 def test_noise_gives_way_to_effects_that_earn_it(monkeypatch, power, price, quieter):
     one, more = explained(1, 1.0, 100.0), explained(3, power, price)
-    monkeypatch.setattr(further_effects.noise_shown, "loudness", lambda bench: bench.power)
     monkeypatch.setattr(further_effects.noise_shown, "hushed", lambda bench: bench)
-    monkeypatch.setattr(further_effects, "_first", lambda _: one)
     monkeypatch.setattr(further_effects, "_around", lambda *_: None)
     monkeypatch.setattr(further_effects, "_promising", lambda *_: [(None, None)])
     monkeypatch.setattr(further_effects, "_fitted", lambda *_: more)
     monkeypatch.setattr(further_effects, "_agreed", lambda _, best: best)
-    monkeypatch.setattr(further_effects, "refit", lambda *_: "the fit")
-    monkeypatch.setattr(further_effects, "replace", lambda base, found: found)
-    monkeypatch.setattr(further_effects, "with_noise", lambda base, bench: bench)
-    monkeypatch.setattr(further_effects, "Search", lambda found, _: found)
-    base = SimpleNamespace(bench=SimpleNamespace(power=1.0), nuisances={})
-    search = SimpleNamespace(base=base, say=lambda _: None)
-    found = further_effects.without_hidden(search)
-    assert (found is not search) == quieter
+    found = begun(monkeypatch, one)
+    assert (found is not None) == quieter
     if quieter:
         assert found.starts == more.starts
 
@@ -132,16 +138,8 @@ WHOLE = SimpleNamespace(effect=SimpleNamespace(parameters=(SimpleNamespace(whole
 def test_one_effect_is_what_the_search_begins_with(monkeypatch, start, power, adopted):
     one = explained(1, power, 100.0)
     one.starts = (start,)
-    monkeypatch.setattr(further_effects.noise_shown, "loudness", lambda bench: bench.power)
-    monkeypatch.setattr(further_effects, "_first", lambda _: one)
     monkeypatch.setattr(further_effects, "_further", lambda *_: None)
-    monkeypatch.setattr(further_effects, "refit", lambda *_: "the fit")
-    monkeypatch.setattr(further_effects, "replace", lambda base, found: found)
-    monkeypatch.setattr(further_effects, "with_noise", lambda base, bench: bench)
-    monkeypatch.setattr(further_effects, "Search", lambda found, _: found)
-    base = SimpleNamespace(bench=SimpleNamespace(power=1.0), nuisances={})
-    search = SimpleNamespace(base=base, say=lambda _: None)
-    assert (further_effects.without_hidden(search) is not search) == adopted
+    assert (begun(monkeypatch, one) is not None) == adopted
 
 
 def test_a_chair_that_is_hardly_shaken_is_not_looked_at_again(monkeypatch):

@@ -116,21 +116,31 @@ def test_a_gap_is_laid_to_a_further_effect_only_once_the_first_is_fitted_anew(fi
     assert "motor+rolling" not in {keys for keys, _ in fits.asked}
 
 
-def test_an_effect_that_brings_nothing_once_all_is_made_anew_is_dropped(fits, monkeypatch):
+def motor_brings_nothing(fits, monkeypatch, *, alone, anew, beside):
+    """Rolling resistance with a motor that ends at 1104.
+
+    Args:
+      alone, anew: totals of rolling resistance, from the chair as given and made anew there.
+      beside: its total from where both ended.
+    """
     fits.answers.update(
         {
-            ("rolling", "as given"): fit(1200.0, "rolling"),
-            ("rolling", "track of rolling"): fit(1110.0, "rolling"),
+            ("rolling", "as given"): fit(alone, "rolling"),
+            ("rolling", "track of rolling"): fit(anew, "rolling"),
             ("motor+rolling", "as given"): fit(1105.0, "rolling", "motor"),
             ("motor+rolling", "track of motor+rolling"): fit(1104.0, "rolling", "motor"),
             ("motor", "as given"): None,
             ("motor", "track of motor+rolling"): None,
-            ("rolling", "track of motor+rolling"): fit(1115.0, "rolling"),
+            ("rolling", "track of motor+rolling"): fit(beside, "rolling"),
         }
     )
     monkeypatch.setattr(
         search.hypotheses, "weigh", lambda _, starts: Hypothesis(tuple(starts), 870.0, 850.0)
     )
+
+
+def test_an_effect_that_brings_nothing_once_all_is_made_anew_is_dropped(fits, monkeypatch):
+    motor_brings_nothing(fits, monkeypatch, alone=1200.0, anew=1110.0, beside=1115.0)
     looking = searching()
     chosen = looking.without_needless(looking.fit(BOTH))
     assert chosen.hypothesis.keys == ("rolling",)
@@ -138,20 +148,7 @@ def test_an_effect_that_brings_nothing_once_all_is_made_anew_is_dropped(fits, mo
 
 def test_an_effect_that_helped_a_stuck_fit_is_dropped(fits, monkeypatch):
     """Alone, rolling resistance is stuck at 1400; from where both ended it fits as well as both."""
-    fits.answers.update(
-        {
-            ("rolling", "as given"): fit(1400.0, "rolling"),
-            ("rolling", "track of rolling"): fit(1400.0, "rolling"),
-            ("motor+rolling", "as given"): fit(1105.0, "rolling", "motor"),
-            ("motor+rolling", "track of motor+rolling"): fit(1104.0, "rolling", "motor"),
-            ("motor", "as given"): None,
-            ("motor", "track of motor+rolling"): None,
-            ("rolling", "track of motor+rolling"): fit(1106.0, "rolling"),
-        }
-    )
-    monkeypatch.setattr(
-        search.hypotheses, "weigh", lambda _, starts: Hypothesis(tuple(starts), 870.0, 850.0)
-    )
+    motor_brings_nothing(fits, monkeypatch, alone=1400.0, anew=1400.0, beside=1106.0)
     looking = searching()
     looking.fit(ONE)
     chosen = looking.without_needless(looking.fit(BOTH))
