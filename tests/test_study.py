@@ -81,19 +81,6 @@ def test_a_dead_channel_is_left_out_and_said(tmp_path):
     assert any("imu_gyro.z is exactly zero" in note for note in study.notes)
 
 
-def test_accelerometers_beside_a_rider_who_moves_are_left_out_and_said(tmp_path):
-    nods = {"rider_trunk_flexion": 0.1 + 0.05 * np.sin(6.0 * TIME)}
-    shaken = {"imu_accelerometer.x": np.sin(6.0 * TIME)}
-    head = 'model = "manual"\nrider = "moving"\n'
-    study = mjchair.read_study(write(tmp_path, wheels() | shaken | nods, head=head))
-    assert set(study.channels) == {"left_wheel_speed", "right_wheel_speed"}
-    assert any("imu_accelerometer.x is left out" in note for note in study.notes)
-    still = mjchair.read_study(write(tmp_path, wheels() | shaken))
-    assert "imu_accelerometer.x" in still.channels
-    write(tmp_path, shaken | nods, head=head)
-    fails(tmp_path, "only accelerometers were measured; beside a rider")
-
-
 def test_a_dead_channel_of_a_standing_chair_stays(tmp_path):
     still = {"left_wheel_speed": np.zeros(TIME.size), "imu_gyro.z": 0.01 * np.sin(40.0 * TIME)}
     study = mjchair.read_study(write(tmp_path, still, EAST))

@@ -232,6 +232,7 @@ def _let_move(spec: mujoco.MjSpec, rigid: mujoco.MjModel, rider: Rider) -> mujoc
     seat.add(spec, rigid, rider, mass)
     moving = compile_spec(spec)
     seat.tune(spec, moving)
+    moving = compile_spec(spec)
     for wheel in wheels(rigid):
         keep_stiffness(spec, rigid, moving, wheel)
     return compile_spec(spec)

@@ -20,8 +20,9 @@ import mujoco
 import numpy as np
 
 from mjchair.errors import MjchairError
-from mjchair.rider import anatomy
+from mjchair.rider import anatomy, driven_joint
 from mjchair.rider.anatomy import JOINTS, LANDMARKS, SEGMENTS, SIDES, STATURE, joints_of
+from mjchair.rider.driven_joint import Following
 from mjchair.rider.rider import (
     SHOULDER_WIDTH,
     Array,
@@ -32,14 +33,12 @@ from mjchair.rider.rider import (
 )
 
 CHAIR = "chair"
-# A joint follows its input by LAG time steps of the model: gain kp and damping LAG h kp. The
-# discrete spring and damper is stable whatever the mass as long as this is above one half.
-LAG = 0.6
-# rad/s: kp is the joint's inertia at rest times its square. At 2 ms the joint has closed all but
-# 1e-3 of a gap after 9 steps; gravity bends no joint by more than 1e-4 rad.
-BANDWIDTH = 1500.0
-LIGHT = 0.02  # kg m^2: lighter joints (wrists, forearms) get the gains of this inertia
-STABLE = 0.5
+# Change of a joint's speed in one time step h: by STIFFNESS of gap / h, by DAMPING of the speed. A
+# steady motion is then DAMPING / STIFFNESS = 0.6 steps late. A joint is stable for STIFFNESS <
+# 4 - 2 DAMPING, which is up to 1.3 times the time step that it was built for.
+STIFFNESS, DAMPING = 1.2, 0.72
+LONGEST = 1.2  # of that time step: more is refused
+LIGHT = 0.02  # kg m^2: lighter joints (wrists, forearms) get the armature of this inertia
 LEAST_INERTIA = 1e-9  # kg m^2, of rounding: what is smaller is none
 
 
@@ -382,7 +381,6 @@ def _add_inputs(spec: mujoco.MjSpec, angles: Mapping[str, float]) -> None:
             name=joint.name,
             trntype=mujoco.mjtTrn.mjTRN_JOINT,
             target=joint.name,
-            biastype=mujoco.mjtBias.mjBIAS_AFFINE,
         )
         actuator.ctrlrange = joint.low - angles[joint.name], joint.high - angles[joint.name]
         actuator.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
@@ -395,32 +393,29 @@ def _add_inputs(spec: mujoco.MjSpec, angles: Mapping[str, float]) -> None:
 
 
 def tune(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-    """Set the gains of the rider's inputs to the inertia that each joint moves at rest.
+    """Let each of the rider's joints follow its input, set to the inertia that it moves at rest.
 
     Args:
       spec: edited in place. model: compiled from it.
     """
-    delay = LAG * spec.option.timestep
+    step = spec.option.timestep
+    following = Following(stiffness=STIFFNESS / step**2, damping=DAMPING / step)
     for joint in JOINTS:
-        dof = model.joint(joint.name).dofadr[0]
-        stiffness = max(float(model.dof_M0[dof]), LIGHT) * BANDWIDTH**2
-        actuator = spec.actuator(joint.name)
-        gain, bias = np.zeros(10), np.zeros(10)
-        gain[0], bias[1], bias[2] = stiffness, -stiffness, -delay * stiffness
-        actuator.gainprm, actuator.biasprm = gain, bias
+        inertia = max(float(model.dof_M0[model.joint(joint.name).dofadr[0]]), LIGHT)
+        driven_joint.damp(spec, spec.joint(joint.name), inertia, following)
+        driven_joint.drive(spec.actuator(joint.name), spec.joint(joint.name), following)
 
 
 def check_timestep(model: mujoco.MjModel) -> None:
-    """Hold the time step against the stability limit of the rider's joints.
+    """Hold the time step against that which the rider's joints were built for.
 
     Raises:
-      MjchairError: a joint follows its input by less than half a time step.
+      MjchairError: a time step so long that a joint may oscillate about its input.
     """
-    for i in range(model.nu):
-        stiffness, damping = -model.actuator_biasprm[i, 1:3]
-        if model.actuator(i).name.endswith(anatomy.JOINT_NAMES) and stiffness > 0.0:
-            most = damping / (STABLE * stiffness)
-            if model.opt.timestep > most:
+    for i in range(model.njnt):
+        if model.joint(i).name.endswith(anatomy.JOINT_NAMES):
+            most = LONGEST * driven_joint.delay(model, i) * STIFFNESS / DAMPING
+            if 0.0 < most < model.opt.timestep:
                 raise MjchairError(
                     f"timestep {model.opt.timestep:g} s is beyond the stability limit of the "
                     f"rider's joints, {most:.3g} s; build the chair with that timestep "

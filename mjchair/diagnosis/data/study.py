@@ -155,12 +155,7 @@ def _without_heading(runs: list[Run]) -> list[str]:
 def _checked(trial: Trial, axle: RearAxle) -> tuple[Trial, list[str]]:
     """The trial as it is used, and what was noticed."""
     said = []
-    for stage in (
-        trial_checks.measured_part,
-        trial_checks.without_dead,
-        trial_checks.without_accelerometers,
-        trial_checks.other_side,
-    ):
+    for stage in (trial_checks.measured_part, trial_checks.without_dead, trial_checks.other_side):
         trial, noticed = stage(trial)
         said += noticed
     trial_checks.check(trial)

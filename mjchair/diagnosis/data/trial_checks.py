@@ -166,29 +166,6 @@ def without_dead(trial: Trial) -> tuple[Trial, list[str]]:
     return replace(trial, channels=MappingProxyType(left)), said
 
 
-def without_accelerometers(trial: Trial) -> tuple[Trial, list[str]]:
-    """The run without accelerometers where the joints of a rider are driven.
-
-    MuJoCo's accelerometer shows the acceleration before the damping of such joints acts, up to 14
-    times that of the chair (docs/rider.md), so that it would contradict every model.
-
-    Raises:
-      MjchairError: no channel is left.
-    """
-    driven = () if trial.inputs is None else trial.inputs.controls
-    seen = [n for n in trial.channels if "accelerometer" in n]
-    if not seen or not any(base_name(n) in JOINT_NAMES for n in driven):
-        return trial, []
-    left = {n: v for n, v in trial.channels.items() if n not in seen}
-    if not left:
-        raise MjchairError(
-            f"{trial.name}: only accelerometers were measured; beside a rider who moves they "
-            "cannot be compared, so give a speed or an angle of the wheels, or a gyroscope"
-        )
-    said = [f"{trial.name}: {n} is left out, since the rider's joints move" for n in seen]
-    return replace(trial, channels=MappingProxyType(left)), said
-
-
 def tells_turning(channels: Iterable[str]) -> bool:
     """Whether these channels tell how the chair turns."""
     names = set(channels)

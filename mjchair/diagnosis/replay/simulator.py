@@ -24,10 +24,11 @@ from mjchair.diagnosis.replay.sampling import places, sampled
 from mjchair.diagnosis.replay.state_transfer import StateCarrier
 from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
-from mjchair.model import moving_share, slide
+from mjchair.model import moving_share
 from mjchair.model.load import loaded
 from mjchair.model.visual_geoms import without_visual_geoms
 from mjchair.model.wheels import COMFORTABLE, check_timestep, cut_damping
+from mjchair.rider import driven_joint
 from mjchair.simulation import batch, names
 
 Array = NDArray[np.float64]
@@ -160,7 +161,7 @@ class WindowSimulator:
             if column in known:
                 a = known.index(column)
                 out[:, a] = motion.place_at(
-                    time + slide.delay(model, int(model.actuator_trnid[a, 0]))
+                    time + driven_joint.delay(model, int(model.actuator_trnid[a, 0]))
                 )
         return out
 
