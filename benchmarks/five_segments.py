@@ -391,7 +391,10 @@ def _report(name: str, folder: Path) -> None:
         + ", ".join(f"{p} {v.value:.4g}+-{v.std or 0.0:.2g}" for p, v in e.parameters.items())
         for e in found.effects
     )
-    print(f"{name}: {found.verdict}: {said or 'no effect'}; hidden {CASES[name].hidden}")
+    said += "; more is missing" if found.more_missing else ""
+    rivals = ", ".join(" or ".join(names) for names in found.alternatives)
+    print(f"{name}: {found.verdict}: {said or 'no effect'}; undecided: {rivals or 'nothing'}")
+    print(f"    hidden: {CASES[name].hidden}")
 
 
 if __name__ == "__main__":

@@ -133,6 +133,22 @@ def test_friction_and_stiffness_factors_scale_peak_and_slope():
     )
 
 
+def test_the_longitudinal_factor_is_of_the_slip_along_the_heading_alone():
+    base = read_tire("wheelchair")
+    stiff, small = base.with_(longitudinal_factor=2.0), np.array([1e-4])
+    assert stiff.forces(300, small, 0).Fx == pytest.approx(
+        2 * base.forces(300, small, 0).Fx, rel=1e-3
+    )
+    assert np.array_equal(stiff.forces(300, 0, small).Fy, base.forces(300, 0, small).Fy)
+    # rolling in a steady state, and the block of an older model, which has none
+    assert step(stiff, u=1e-5, vsx=2.5e-4)["fx"] == pytest.approx(
+        2 * step(base, u=1e-5, vsx=2.5e-4)["fx"], rel=1e-2
+    )
+    older = base.block()
+    older[block.LONGITUDINAL_FACTOR] = 0.0
+    assert law.along(older) == 1.0
+
+
 def test_load_exponent_bends_the_load_dependence():
     bent = read_tire("linear").with_(load_exponent=0.2)
     at = float(bent.nominal_load)

@@ -247,7 +247,7 @@ def springs(
         for axis, k, m, at in zip(
             ("along", "across", "about its axle"),
             (
-                slope * c_kappa / sigma_x,
+                slope * law.along(tire) * c_kappa / sigma_x,
                 slope * c_alpha / sigma_y,
                 rolling / tire[block.ROLLING_RELAXATION],
             ),

@@ -37,6 +37,7 @@ NOMINAL_LOAD = 13  # N
 PNEUMATIC_TRAIL = 14  # m at zero slip, where the family has no aligning moment of its own
 SLIDE_SPEED = 15  # m/s, slip speed below which sliding at standstill keeps its peak
 RADIUS = 16  # m, unloaded
+LONGITUDINAL_FACTOR = 17  # 1, scales the slip stiffness along the heading alone; 0: 1
 HEADER = 20  # the first coefficient
 
 # the road's own block, on the geom that a tire stands on: places of other friction and resistance

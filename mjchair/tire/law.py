@@ -136,6 +136,13 @@ def factors(p: Block, fz: float) -> tuple[float, float]:
     return p[block.FRICTION_FACTOR] * share, p[block.STIFFNESS_FACTOR] * share
 
 
+@register_jitable
+def along(p: Block) -> float:
+    """Factor of the slip stiffness along the heading; blocks of older models have none."""
+    factor = p[block.LONGITUDINAL_FACTOR]
+    return factor if factor > 0.0 else 1.0
+
+
 @register_jitable(forceinline=False)
 def steady_forces(p: Block, fz: float, slip: Slip, rolling: Rolling, friction: float) -> TireForce:
     """Steady-state forces and moments of one tire.
@@ -155,7 +162,7 @@ def steady_forces(p: Block, fz: float, slip: Slip, rolling: Rolling, friction: f
     fx, fy, mx, my, mz = family_forces(
         p,
         fz,
-        slip.kappa * stretch,
+        slip.kappa * stretch * along(p),
         slip.tan_alpha * stretch,
         slip.gamma,
         rolling.speed,
@@ -234,7 +241,8 @@ def step_tire(
     sigma_x, sigma_y = family_relaxation(p, fz, c_kappa, c_alpha)
     peak, slope = factors(p, fz)
     peak *= road.friction
-    c_kappa, c_alpha, d_x, d_y = c_kappa * slope, c_alpha * slope, d_x * peak, d_y * peak
+    c_kappa, c_alpha = c_kappa * slope * along(p), c_alpha * slope
+    d_x, d_y = d_x * peak, d_y * peak
 
     u, w = limit_deflections(
         relax(old.longitudinal, motion.vsx, vx, sigma_x, h),

@@ -81,6 +81,9 @@ class Tire:
     turning_moment: float = quantity(0.0, "N m", 0.0, 100.0, "moment against the yaw rate")
     friction_factor: float = quantity(1.0, "1", 0.01, 100.0, "scales the peak force")
     stiffness_factor: float = quantity(1.0, "1", 0.01, 100.0, "scales the slip stiffness")
+    longitudinal_factor: float = quantity(
+        1.0, "1", 0.01, 100.0, "scales the slip stiffness along the heading alone"
+    )
     load_exponent: float = quantity(
         0.0, "1", -1.0, 1.0, "force over load falls with (Fz / nominal load) ** -exponent"
     )

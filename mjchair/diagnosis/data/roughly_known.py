@@ -8,7 +8,7 @@ name; without priors they swallow effects.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -30,6 +30,8 @@ class Nuisance:
       name: as in study.toml. std: prior standard deviation, in `unit`.
       edit: ``edit(spec, value)``, value 0 being no change; None for a sensor's bias or scale.
       channel, error: of a sensor, and what it does.
+      linear: whether its answer is added to predictions, and no chair is made with it. No time step
+        simulates the tires that do not give way at all, which a chair nearly may have.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Nuisance:
     edit: Edit | None = None
     channel: str = ""
     error: SensorError = SensorError.BIAS
+    linear: bool = False
 
 
 def _mass(spec: mujoco.MjSpec, value: float) -> None:
@@ -80,6 +83,28 @@ def _stiffness(wheels: tuple[str, ...]) -> Edit:
     return edit
 
 
+def _rocking(spec: mujoco.MjSpec, value: float) -> None:
+    """Vertical compliance of all tires, on which the chair rocks under every push."""
+    for wheel in (*parts.REAR, *parts.casters(spec)):
+        geom = parts.tire_geom(spec, wheel)
+        solref = np.array(geom.solref)
+        # direct: minus stiffness, minus damping; else a time constant and a damping ratio
+        solref[0] *= 1.0 / (1.0 + value) if solref[0] < 0.0 else (1.0 + value) ** 0.5
+        geom.solref = solref
+
+
+def _slip(spec: mujoco.MjSpec, value: float) -> None:
+    """Slip of the rear wheels, and the give of their carcass, under a force along the heading."""
+
+    def stiffer(factor: float) -> float:
+        return (factor or 1.0) / (1.0 + value)  # 0, of an older model, means 1
+
+    parts.edit_tires(spec, block.LONGITUDINAL_FACTOR, stiffer, parts.REAR)
+
+
+# Relative. How much tires give way downwards and along their heading is an assumption in every
+# model that ships, and nobody measures it on a chair. At the wall of three they do not at all.
+COMPLIANCE = 1.0 / 3.0
 MECHANICAL = (
     Nuisance("mass", 0.05, "1", _mass),
     Nuisance("inertia", 0.10, "1", _inertia),
@@ -89,6 +114,8 @@ MECHANICAL = (
     Nuisance("centre_z", 0.03, "m", _centre(2)),
     Nuisance("rear_stiffness", 0.07, "1", _stiffness(parts.REAR)),
     Nuisance("caster_stiffness", 0.07, "1", _stiffness(parts.CASTERS)),
+    Nuisance("rocking", COMPLIANCE, "1", _rocking, linear=True),
+    Nuisance("slip", COMPLIANCE, "1", _slip, linear=True),
     Nuisance("rolling_radius", 0.0015, "m", _rolling_radius),
 )
 
@@ -114,13 +141,5 @@ def nuisances(channels: tuple[str, ...], given: Mapping[str, float]) -> tuple[Nu
         if name not in known:
             raise MjchairError(f"unknown nuisance {name!r}" + nearest(name, known))
     return tuple(
-        Nuisance(
-            n.name,
-            given.get(n.name, given.get(n.name.rsplit(".", 1)[0], n.std)),
-            n.unit,
-            n.edit,
-            n.channel,
-            n.error,
-        )
-        for n in every
+        replace(n, std=given.get(n.name, given.get(n.name.rsplit(".", 1)[0], n.std))) for n in every
     )

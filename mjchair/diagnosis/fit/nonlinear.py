@@ -82,6 +82,7 @@ def refit(
       MjchairError: `start` is no chair that can be: it does not compile, or its simulation fails.
     """
     simulator = bench.simulator
+    anew = nuisances is None
     if nuisances is None:
         model, errors = simulator.compile(start.edit), start.sensor_errors(simulator.channels)
         before = track(simulator, model, bench.noise, errors, before, anew=True)
@@ -89,8 +90,9 @@ def refit(
     best = _around(bench, start, before, nuisances)
     variant = _after_linear_step(bench, best)
     failed = 0
-    for _ in range(rounds):
-        if best.total - best.promised < DONE or failed == HALVED:
+    for k in range(rounds):
+        # columns that were made anew are followed once, however little they promise
+        if failed == HALVED or (best.total - best.promised < DONE and not (anew and k == 0)):
             break
         try:
             here = _around(bench, variant, best.track, nuisances)
@@ -156,7 +158,7 @@ def _check_finite(columns: Sequence[Column], variant: Variant) -> None:
 
 def _outside(bench: Bench, system: System, count: int) -> list[int]:
     """Places of the nuisances that stand in no variant, such as sensor biases."""
-    inside = {RoughlyKnown(n.name) for n in bench.nuisances if n.edit is not None}
+    inside = {RoughlyKnown(n.name) for n in bench.nuisances if n.edit is not None and not n.linear}
     return [i for i, column in enumerate(system.columns[:count]) if column not in inside]
 
 
@@ -196,7 +198,7 @@ def moved(variant: Variant, system: System, step: Array) -> Variant:
     """The variant after a step (p,) of the system's coefficients, within walls and bounds."""
     offsets = dict(variant.offsets)
     for n in variant.nuisances:
-        if n.edit is not None:
+        if n.edit is not None and not n.linear:
             by = step[system.places[RoughlyKnown(n.name)]]
             there = offsets.get(n.name, 0.0) + by
             offsets[n.name] = float(np.clip(there, -bounded.WALL, bounded.WALL))

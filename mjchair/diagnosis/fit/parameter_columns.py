@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mjchair.diagnosis.data.roughly_known import COMPLIANCE, Nuisance
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ColumnId, ParameterId, RoughlyKnown
 from mjchair.diagnosis.fit.variant import Variant, nudged
@@ -26,7 +27,7 @@ def nuisance_columns(bench: Bench, track: Track, variant: Variant) -> dict[Colum
     simulator = bench.simulator
     mechanical = [n for n in bench.nuisances if n.edit is not None]
     points = [
-        *(Point(_with_more(variant, n.name).edit, 1.0 / PART, whole=True) for n in mechanical),
+        *(Point(_beside(variant, n).edit, 1.0 / _part(n), whole=True) for n in mechanical),
         Point(derivatives.half_step, FINER, fine=True),
         Point(derivatives.other_integrator, FINER, fine=True),
     ]
@@ -52,14 +53,21 @@ def nuisance_columns(bench: Bench, track: Track, variant: Variant) -> dict[Colum
     return out
 
 
-def _with_more(variant: Variant, name: str) -> Variant:
-    """The variant with PART more of a nuisance, which is in the chair before its effects are.
+def _part(nuisance: Nuisance) -> float:
+    """Standard deviations of a nuisance by which its derivative is taken.
+
+    Tires are made stiffer by the same part whatever a study says of them: a time step is for some.
+    """
+    return -COMPLIANCE / nuisance.std if nuisance.linear else PART
+
+
+def _beside(variant: Variant, nuisance: Nuisance) -> Variant:
+    """The variant with a part more of a nuisance, which is in the chair before its effects are.
 
     A chair 2 kg heavier is one whose frame is: of a person who moves on it nothing was added.
     """
-    return replace(
-        variant, offsets={**variant.offsets, name: variant.offsets.get(name, 0.0) + PART}
-    )
+    there = variant.offsets.get(nuisance.name, 0.0) + _part(nuisance)
+    return replace(variant, offsets={**variant.offsets, nuisance.name: there})
 
 
 def term_columns(bench: Bench, track: Track, variant: Variant) -> dict[ColumnId, Column]:
