@@ -341,6 +341,10 @@ class LinearSearch(search.Search):
         """The fit itself: a linear one never goes astray."""
         return fitted
 
+    def near_to(self, tried: Any) -> Any:
+        """Nothing else to weigh by: a linear system is the same around any chair."""
+        return contextlib.nullcontext()
+
     def beside(self, best: Any) -> Any:
         """None: around the fit the algebra is what it is around the chair without effects."""
         return None

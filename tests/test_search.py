@@ -5,6 +5,7 @@ In: totals (chi2) of fits, given by name. Out: which fit the search takes.
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -249,6 +250,8 @@ def test_a_rival_of_one_effect_is_weighed_against_what_that_effect_brings(
     looking.weigh = lambda starts: Hypothesis(
         tuple(starts), gains[tuple(sorted(s.effect.key for s in starts))], 0.0
     )
+    around = []
+    looking.near_to = lambda tried: nullcontext(around.append(tried.hypothesis.keys))
     of_all = np.resize([4.0, -4.0], 20)
     ours = SimpleNamespace(total=1_000.0, chi2=np.full(20, 50.0), at_bound=())
     theirs = SimpleNamespace(total=1_000.0 + worse, chi2=50.0 + worse / 20.0 + of_all, at_bound=())
@@ -260,3 +263,4 @@ def test_a_rival_of_one_effect_is_weighed_against_what_that_effect_brings(
     chosen = search.Tried(both, ours)
     assert looking.own_gain(chosen, MOTOR) == 4_000.0
     assert [len(group) for group in looking.rivals(chosen)] == [0, int(stays)]
+    assert around == [("motor", "rolling")]  # of the motor, which brings less, but not of the other

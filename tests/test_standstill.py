@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 import mjchair
+from mjchair.effects import rider_motion
+from mjchair.simulation.initial import Initial, start
 
 CREEP = 1e-10  # m/s
 
@@ -94,6 +96,20 @@ def test_free_chair_rests_on_the_flat(manual):
         data.sensor(f"{s}_{w}_tire").data[2] for s in ("left", "right") for w in ("wheel", "caster")
     )
     assert total == pytest.approx(90.0 * 9.81, rel=1e-9)
+
+
+def test_a_chair_starts_at_rest_though_its_rider_sways():
+    """The sway begins with the run; a force that never rests would never let the chair rest."""
+    rests = []
+    for amplitude in (0.0, 0.05):
+        spec = mjchair.load_spec("manual")
+        rider_motion.harmonic(spec, mass=40.0, amplitude=amplitude, frequency=0.9, phase=0.5)
+        model = spec.compile()
+        data = start(model, Initial())
+        rests.append(data.qpos.copy())
+    assert np.array_equal(*rests)
+    mujoco.mj_step(model, data, nstep=100)
+    assert abs(data.sensor("velocity").data[0]) > 1e-3
 
 
 def test_rolling_resistance_holds_on_a_slope_smaller_than_it():

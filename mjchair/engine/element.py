@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 
+import mujoco
 from numba.extending import register_jitable
 
 from mjchair.engine.views import DataView, ModelView
@@ -27,6 +28,14 @@ KIND = 1
 FIRST = 2
 NUMBERS = 6  # of a block
 DRAG, SWAY = range(2)
+
+
+def hold_sway(model: mujoco.MjModel) -> None:
+    """Let every rider of a model who sways sit still: the elements of kind SWAY have no force."""
+    if model.nuser_actuator < NUMBERS:
+        return
+    user = model.actuator_user
+    user[(user[:, TAG_AT] == TAG) & (user[:, KIND] == SWAY), FIRST] = 0.0
 
 
 @register_jitable(forceinline=True)

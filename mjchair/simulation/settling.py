@@ -18,6 +18,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjchair.engine import element
 from mjchair.errors import MjchairError
 from mjchair.model.wheels import wheels
 from mjchair.simulation.standing import (
@@ -62,8 +63,8 @@ class Outcome(enum.Enum):
 def settle(model: mujoco.MjModel, data: mujoco.MjData, held: bool) -> None:
     """Bring the chair in `data` to rest; its velocities end at zero. Callbacks must be in place.
 
-    Meanwhile a moving surface (a treadmill) stands still, and the user's `mjcb_control` is not
-    called.
+    Meanwhile a moving surface (a treadmill) stands still, a rider who sways sits still, and the
+    user's `mjcb_control` is not called.
 
     Args:
       model: of the chair. data: at time 0, with the chair at its position.
@@ -104,6 +105,7 @@ def _settled(
     settling.opt.timestep = model.opt.timestep if step is None else step
     settling.dof_damping[:] += DRAG * model.dof_M0
     settling.geom_surfacevel[:] = 0.0
+    element.hold_sway(settling)
     settling.opt.tolerance = min(settling.opt.tolerance, TOLERANCE)
     if held:
         hinges = model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE

@@ -6,7 +6,8 @@ rules that decide stand in rules.py; a hypothesis that this chair cannot have is
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from operator import attrgetter
 
@@ -157,12 +158,18 @@ class Search:
         Args:
           best: whose effects stay; everything is made anew around it.
         """
-        starts = best.hypothesis.starts
-        self.near = near_fit(self.base, Found(starts, self.anew(best)))
+        with self.near_to(best):
+            return self.best_of(_with_one_more(self, best.hypothesis.starts), patient=False)
+
+    @contextmanager
+    def near_to(self, tried: Tried) -> Iterator[None]:
+        """Weigh, and begin fits, by the linear algebra around a fit with everything made anew."""
+        before = self.near
+        self.near = near_fit(self.base, Found(tried.hypothesis.starts, self.anew(tried)))
         try:
-            return self.best_of(_with_one_more(self, starts), patient=False)
+            yield
         finally:
-            self.near = None
+            self.near = before
 
     def weigh(self, starts: Sequence[Start]) -> Hypothesis:
         """The hypothesis by linear algebra: around the effects that were found, if any."""
@@ -303,23 +310,35 @@ class Search:
         return chosen, rivals
 
     def rivals(self, chosen: Tried) -> list[list[Rival]]:
-        """For every effect of the choice: what could stand in its place, best first."""
+        """For every effect of the choice: what could stand in its place, best first.
+
+        In the place of an effect that brings less than the others, it is weighed around the fit:
+        around a chair without effects, the others are wrong by more than this one brings.
+        """
         hypothesis = chosen.hypothesis
-        most = REFITTED if len(hypothesis.starts) == 1 else BESIDE
+        whole = gain(self.base, chosen.fitted)
         out = []
         for start in hypothesis.starts:
-            others = tuple(s for s in hypothesis.starts if s is not start)
             own = self.own_gain(chosen, start)
-            near = [h for h in _replacements(self, start, others) if _close(hypothesis, h, own)]
-            tried = [self.fit(h, chosen) for h in near[:most]]
-            out.append(
-                [
-                    Rival(t.hypothesis, t.fitted)
-                    for t in tried
-                    if t is not None and _not_ruled_out(t, chosen, own)
-                ]
-            )
+            if len(hypothesis.starts) > 1 and own < 0.5 * whole:
+                with self.near_to(chosen):
+                    out.append(self._rivals(chosen, start, own))
+            else:
+                out.append(self._rivals(chosen, start, own))
         return out
+
+    def _rivals(self, chosen: Tried, start: Start, own: float) -> list[Rival]:
+        """What could stand in the place of one effect, which brings `own` of chi2."""
+        starts = chosen.hypothesis.starts
+        others = tuple(s for s in starts if s is not start)
+        here = chosen.hypothesis if self.near is None else self.weigh(starts)
+        near = [h for h in _replacements(self, start, others) if _close(here, h, own)]
+        tried = [self.fit(h, chosen) for h in near[: REFITTED if not others else BESIDE]]
+        return [
+            Rival(t.hypothesis, t.fitted)
+            for t in tried
+            if t is not None and _not_ruled_out(t, chosen, own)
+        ]
 
     def fit(self, hypothesis: Hypothesis, best: Tried | None = None) -> Tried | None:
         """The nonlinear fit; from a second start where the first misses what was promised.

@@ -12,7 +12,7 @@ neither converges.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -95,7 +95,7 @@ def refit(
         if failed == HALVED or (best.total - best.promised < DONE and not (anew and k == 0)):
             break
         try:
-            here = _around(bench, variant, best.track, nuisances)
+            here = _around(bench, variant, best.track, nuisances, best.std)
         except (MjchairError, np.linalg.LinAlgError):  # of a step to what no chair can be
             failed, variant = failed + 1, _between(best.variant, variant)
             continue
@@ -107,9 +107,16 @@ def refit(
 
 
 def _around(
-    bench: Bench, variant: Variant, before: Track | None, nuisances: dict[ColumnId, Column]
+    bench: Bench,
+    variant: Variant,
+    before: Track | None,
+    nuisances: dict[ColumnId, Column],
+    known: Mapping[ParameterId, float] | None = None,
 ) -> Fitted:
     """A variant as it is, and the linear system around it.
+
+    Args:
+      known: standard errors of the parameters in the fit before; None: there is none.
 
     Raises:
       MjchairError: it does not compile, or its simulation fails.
@@ -120,7 +127,7 @@ def _around(
     here = track(simulator, model, bench.noise, errors, before)
     columns = dict(nuisances)
     count = len(columns)
-    columns.update(term_columns(bench, here, variant))
+    columns.update(term_columns(bench, here, variant, known))
     _check_finite([here.predicted, *columns.values()], variant)
     system = bench.system(here, columns, count, variant)
     step, total = bounded.solve_nuisances(system, bench.windows, _outside(bench, system, count))

@@ -6,6 +6,7 @@ changes.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -70,8 +71,14 @@ def _beside(variant: Variant, nuisance: Nuisance) -> Variant:
     return replace(variant, offsets={**variant.offsets, nuisance.name: there})
 
 
-def term_columns(bench: Bench, track: Track, variant: Variant) -> dict[ColumnId, Column]:
-    """One column a free parameter of the variant's effects, in units of its typical change."""
+def term_columns(
+    bench: Bench, track: Track, variant: Variant, known: Mapping[ParameterId, float] | None = None
+) -> dict[ColumnId, Column]:
+    """One column a free parameter of the variant's effects, in units of its typical change.
+
+    Args:
+      known: standard errors of parameters, SI, from a fit near by; None: there is none.
+    """
     simulator = bench.simulator
     errors = variant.sensor_errors(simulator.channels)
     out: dict[ColumnId, Column] = {}
@@ -84,7 +91,7 @@ def term_columns(bench: Bench, track: Track, variant: Variant) -> dict[ColumnId,
                     simulator, track, effect.sensor, str(effect.channel), parameter.change
                 )
                 continue
-            beside, factor = nudged(variant, term, parameter)
+            beside, factor = nudged(variant, term, parameter, (known or {}).get(key))
             points[key] = Point(beside.edit, factor)
     if points:
         # a point here is a whole chair, so nothing comes before its edit

@@ -16,7 +16,9 @@ from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.replay.sensor_errors import SensorErrors
 from mjchair.effects.effect import Effect, Parameter, SensorError, Values
 
-NUDGE = 0.25  # of a parameter's typical change, by which a derivative is taken
+NUDGE = 0.25  # of a parameter's typical change, by which a derivative is taken at most
+ERRORS = 3.0  # standard errors by which it is taken, where they are known
+LEAST = 0.003  # of a typical change, by which it is taken at least: less is the rounding of a run
 
 
 @dataclass(frozen=True)
@@ -75,9 +77,20 @@ class Variant:
         )
 
 
-def nudged(variant: Variant, term: Term, parameter: Parameter) -> tuple[Variant, float]:
-    """A variant with one parameter a little aside, and its typical change over that little."""
+def nudged(
+    variant: Variant, term: Term, parameter: Parameter, std: float | None = None
+) -> tuple[Variant, float]:
+    """A variant with one parameter a little aside, and its typical change over that little.
+
+    A rear wheel may be known to 0.05 mm, and half a millimetre further a caster lifts off in a
+    turn: a derivative over more than the standard error is that of another motion.
+
+    Args:
+      std: standard error of the parameter; None: not known yet.
+    """
     by = NUDGE * parameter.change
+    if std is not None:
+        by = min(by, max(ERRORS * std, LEAST * parameter.change))
     value = term.values[parameter.name]
     if not parameter.low <= value + by <= parameter.high:
         by = -by

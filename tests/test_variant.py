@@ -1,0 +1,25 @@
+"""The little by which a parameter is moved for a derivative."""
+
+import pytest
+
+from mjchair.diagnosis.fit.variant import LEAST, NUDGE, Term, Variant, nudged
+from mjchair.effects import wheel_radius
+
+LEFT = wheel_radius.EFFECT.parameter("left")  # 3 mm is worth finding, 50 mm the bound
+
+
+@pytest.mark.parametrize(
+    ("at", "std", "by"),
+    [
+        (0.0, None, NUDGE * 0.003),
+        (0.0, 1e-4, 3e-4),  # where a caster lifts off half a millimetre further, this is too near
+        (0.0, 1.0, NUDGE * 0.003),
+        (0.0, 0.0, LEAST * 0.003),
+        (0.05, 1e-4, -3e-4),
+    ],
+)
+def test_a_derivative_is_taken_over_a_few_standard_errors(at, std, by):
+    term = Term(wheel_radius.EFFECT, {"left": at, "right": 0.0}, ("left",))
+    beside, factor = nudged(Variant((), terms=(term,)), term, LEFT, std)
+    assert beside.terms[0].values["left"] - at == pytest.approx(by)
+    assert factor * by == pytest.approx(LEFT.change)
