@@ -5,8 +5,8 @@ In: totals (chi2) of fits, given by name. Out: which fit the search takes.
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -250,17 +250,20 @@ def test_a_rival_of_one_effect_is_weighed_against_what_that_effect_brings(
     looking.weigh = lambda starts: Hypothesis(
         tuple(starts), gains[tuple(sorted(s.effect.key for s in starts))], 0.0
     )
-    around = []
-    looking.near_to = lambda tried: nullcontext(around.append(tried.hypothesis.keys))
+    looking.near_to = lambda tried: mock.patch.object(looking, "near", looking)
+    near = {}
     of_all = np.resize([4.0, -4.0], 20)
     ours = SimpleNamespace(total=1_000.0, chi2=np.full(20, 50.0), at_bound=())
     theirs = SimpleNamespace(total=1_000.0 + worse, chi2=50.0 + worse / 20.0 + of_all, at_bound=())
     both = Hypothesis((ROLLING, MOTOR), gain=64_000.0, score=63_990.0)
-    monkeypatch.setattr(
-        search, "_replacements", lambda _, start, __: [other] if start is MOTOR else []
-    )
+
+    def replacements(at, start, _):
+        near[start.effect.key] = at.near is not None
+        return [other] if start is MOTOR else []
+
+    monkeypatch.setattr(search, "_replacements", replacements)
     looking.fit = lambda hypothesis, best=None: search.Tried(hypothesis, theirs)
     chosen = search.Tried(both, ours)
     assert looking.own_gain(chosen, MOTOR) == 4_000.0
     assert [len(group) for group in looking.rivals(chosen)] == [0, int(stays)]
-    assert around == [("motor", "rolling")]  # of the motor, which brings less, but not of the other
+    assert near == {"rolling": False, "motor": True}  # around the fit: of the one that brings less

@@ -16,6 +16,9 @@ CLEAR = 12.0  # least sigmas reached by an effect that is counted as one of 15 s
 SHOWS = "15 sigma or more"
 FAINT = 5.0  # sigmas reached below which what is hidden counts as not there, as in the calibration
 OPEN = ("unknown", "ambiguous")
+# not counted: what a fit does not determine or states only to place an effect; the drag area of a
+# wind is the generator's own
+UNCOUNTED = ("mass", "phase", "radius", "drag_area")
 ALIKE = 0.95  # |cos| beyond which two effects cannot be told apart
 
 
@@ -79,7 +82,7 @@ def _errors(lines: Sequence[dict]) -> tuple[list[float], list[bool]]:
             if hidden is None or effect.get("channel", "") not in (line["answer"]["channel"], None):
                 continue
             for name, fitted in effect["parameters"].items():
-                if not fitted["std"] or name in ("mass", "phase", "radius"):
+                if not fitted["std"] or name in UNCOUNTED:
                     continue
                 value = hidden.get(name, 0.0)
                 off = abs(fitted["value"] - value)

@@ -43,6 +43,7 @@ from mjchair.errors import MjchairError
 
 HALF = 0.5  # of the power of what shakes the chair: effects that take less are no matter of noise
 PROMISED = 0.7  # of that power: what linear algebra leaves at most of it
+CLOSES = 0.7  # of what hardly any noise leaves: then the form is right, and only roughly placed
 LOOKED = 3  # further single effects, and pairs, that are weighed against noise
 SHAKEN = 0.25  # of the most power that is believed: then something large may be missing
 ROUNDS = 4  # of fit and noise, at most
@@ -120,7 +121,9 @@ def _is_quieter(one: Bench, other: Bench) -> bool:
 def _promising(base: Base, here: Explained, reduced: Reduced) -> list[tuple[Hypothesis, Bench]]:
     """The further effects that are worth a fit: by linear algebra they leave less and earn it.
 
-    Each with the noise that it leaves.
+    Each with the noise that it leaves. The first single effect is worth one as well where it closes
+    most of what hardly any noise leaves: the columns of a patch are of places a radius apart, and
+    what one of them leaves beside the true place looks like noise until the place is fitted.
     """
     taken = {s.effect.key for s in here.starts}
     free = [s for s in base.starts if s.effect.key not in taken]
@@ -138,7 +141,18 @@ def _promising(base: Base, here: Explained, reduced: Reduced) -> list[tuple[Hypo
         if noise_shown.loudness(bench) < PROMISED * noise_shown.loudness(here.bench):
             weighed.append((here.price - deviance - _penalty((*here.starts, *h.starts)), h, bench))
     most = max((earns for earns, *_ in weighed), default=0.0)
-    return [(h, b) for earns, h, b in weighed if earns > 0.0 and earns > (1.0 - LINEAR) * most]
+    worth = [(h, b) for earns, h, b in weighed if earns > 0.0 and earns > (1.0 - LINEAR) * most]
+    if not worth and options and options[0].gain > CLOSES * _excess(base, here, reduced):
+        worth = [(options[0], noise_shown.hushed(here.bench))]
+    return worth
+
+
+def _excess(base: Base, here: Explained, reduced: Reduced) -> float:
+    """Chi2 that hardly any noise leaves, over what the noise of an explanation leaves."""
+    fitted, count = here.fitted, len(here.fitted.columns)
+    free = count - len(base.nuisances)
+    system = here.bench.system(fitted.track, fitted.columns, count, fitted.variant, free=free)
+    return reduced.total - bounded.reduce(system, here.bench.windows).total
 
 
 def _brought(base: Base, here: Explained, reduced: Reduced) -> float:
@@ -203,7 +217,7 @@ def _left(base: Base, starts: tuple[Start, ...], fitted: Fitted) -> Explained:
 
 def _noise(base: Base, fitted: Fitted, own: dict[ColumnId, Column]) -> tuple[Bench, float]:
     known = nuisances_of(base, fitted)
-    return noise_shown.left_by(base.bench, fitted.track, known, own, given=True)
+    return noise_shown.left_by(noise_shown.hushed(base.bench), fitted.track, known, own, given=True)
 
 
 def _around(base: Base, bench: Bench, fitted: Fitted) -> Reduced:
@@ -212,6 +226,6 @@ def _around(base: Base, bench: Bench, fitted: Fitted) -> Reduced:
 
 
 def _penalty(starts: Sequence[Start]) -> float:
-    """What effects must earn: chi2 of their parameters, less for effects that are common."""
+    """What effects must earn, less those that are common; the deviance prices their parameters."""
     prior = Hypothesis(tuple(starts), 0.0, 0.0).prior
-    return sum(rules.needed(len(s.free)) for s in starts) - prior
+    return rules.WORTH * len(starts) - prior

@@ -7,7 +7,7 @@ rules that decide stand in rules.py; a hypothesis that this chair cannot have is
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from operator import attrgetter
 
@@ -33,6 +33,7 @@ LISTED = 6  # hypotheses of one size, until one can be
 REFITTED = 5  # rivals of an effect that is alone
 BESIDE = 3  # rivals of each effect that has others beside it
 SHARES = (0.875, 0.75, 0.625, 0.5, 0.375, 0.25, 0.125)  # of linear coefficients, for a new start
+HALF = 0.5  # of what an effect brings, that a rival misses by linear algebra: it is none
 SWAPS = 2  # times that a rival takes the place of the chosen hypothesis
 
 
@@ -268,12 +269,14 @@ class Search:
 
     def own_gain(self, chosen: Tried, start: Start) -> float:
         """Chi2 that one effect of the chosen hypothesis brings beside the others."""
-        hypothesis = chosen.hypothesis
+        starts = chosen.hypothesis.starts
         whole = gain(self.base, chosen.fitted)
-        others = [s for s in hypothesis.starts if s is not start]
+        others = [s for s in starts if s is not start]
         if not others:
             return whole
-        return float(np.clip(hypothesis.gain - self.weigh(others).gain, 0.0, max(whole, 0.0)))
+        with self.near_to(chosen):
+            own = self.weigh(starts).gain - self.weigh(others).gain
+        return float(np.clip(own, 0.0, max(whole, 0.0)))
 
     def _from_more(self, fewer: Hypothesis, more: Fitted, own: Tried | None) -> Tried | None:
         """The fit of fewer effects: its own, or a better one that begins where more of them ended.
@@ -312,19 +315,16 @@ class Search:
     def rivals(self, chosen: Tried) -> list[list[Rival]]:
         """For every effect of the choice: what could stand in its place, best first.
 
-        In the place of an effect that brings less than the others, it is weighed around the fit:
-        around a chair without effects, the others are wrong by more than this one brings.
+        In the place of all but the largest effect, it is weighed around the fit: around a chair
+        without effects, the largest is wrong by more than the others bring.
         """
-        hypothesis = chosen.hypothesis
-        whole = gain(self.base, chosen.fitted)
+        starts = chosen.hypothesis.starts
+        own = [self.own_gain(chosen, start) for start in starts]
         out = []
-        for start in hypothesis.starts:
-            own = self.own_gain(chosen, start)
-            if len(hypothesis.starts) > 1 and own < 0.5 * whole:
-                with self.near_to(chosen):
-                    out.append(self._rivals(chosen, start, own))
-            else:
-                out.append(self._rivals(chosen, start, own))
+        for start, brought in zip(starts, own, strict=True):
+            near = nullcontext() if brought == max(own) else self.near_to(chosen)
+            with near:
+                out.append(self._rivals(chosen, start, brought))
         return out
 
     def _rivals(self, chosen: Tried, start: Start, own: float) -> list[Rival]:
@@ -332,7 +332,10 @@ class Search:
         starts = chosen.hypothesis.starts
         others = tuple(s for s in starts if s is not start)
         here = chosen.hypothesis if self.near is None else self.weigh(starts)
-        near = [h for h in _replacements(self, start, others) if _close(here, h, own)]
+        options = _replacements(self, start, others)
+        near = [h for h in options if _close(here, h, own)]
+        if others and not near:  # the first is always fitted: linear algebra tells little of it
+            near = [h for h in options[:1] if here.gain - h.gain < HALF * own]
         tried = [self.fit(h, chosen) for h in near[: REFITTED if not others else BESIDE]]
         return [
             Rival(t.hypothesis, t.fitted)
@@ -369,9 +372,10 @@ class Search:
         tire with a quarter of its friction slides where one with a third of it does not.
         """
         first = self._from(hypothesis, 1.0, best)
+        if self.near is not None:
+            return self._or_from_afar(hypothesis, first, best)
         promised = self.base.reduced.total - hypothesis.gain
-        # one of many, or near a fit: one start is enough
-        beside = (len(hypothesis.starts) > 1 and best is not None) or self.near is not None
+        beside = len(hypothesis.starts) > 1 and best is not None  # of many: one start is enough
         short = first is None or rules.fell_short(
             total=first.total, promised=promised, gain=hypothesis.gain
         )
@@ -385,6 +389,24 @@ class Search:
             names = " and ".join(hypothesis.keys)
             self._note(f"fits of {names} from two starts end at chi2 of {ends}; the less is used")
         return min(fits, key=lambda f: f.total) if fits else None
+
+    def _or_from_afar(
+        self, hypothesis: Hypothesis, near: Fitted | None, best: Tried | None
+    ) -> Fitted | None:
+        """The fit that began near another, or one from afar where that one is stuck.
+
+        What the others had to be without this effect may be a valley of its own: with another
+        wheel a caster lifts off.
+        """
+        if near is not None and not rules.is_stuck(total=near.total, promised=near.promised):
+            return near
+        kept, self.near = self.near, None
+        try:
+            afar = self._from(hypothesis, 1.0, best)
+        finally:
+            self.near = kept
+        fits = [f for f in (near, afar) if f is not None]
+        return min(fits, key=attrgetter("total"), default=None)
 
     def _beside_part(self, hypothesis: Hypothesis, fitted: Fitted | None) -> Fitted | None:
         """The fit, or a better one that begins where a part of the hypothesis was fitted.
