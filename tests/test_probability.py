@@ -24,6 +24,7 @@ from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import RoughlyKnown
 from mjchair.diagnosis.fit.process import KINDS
 from mjchair.diagnosis.fit.system import System
+from mjchair.diagnosis.fit.variant import Variant
 from mjchair.diagnosis.replay.pulses import Force
 from mjchair.effects.library import find
 from mjchair.errors import MjchairError
@@ -78,6 +79,7 @@ def fit(known, one):
     fitted = SimpleNamespace(
         total=known.plain.total - hypothesis.gain,
         sigmas={one.effect.name: math.sqrt(max(hypothesis.gain, 0.0))},
+        variant=Variant(()),
     )
     return SimpleNamespace(hypothesis=hypothesis, fitted=fitted)
 

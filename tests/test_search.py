@@ -11,9 +11,10 @@ from unittest import mock
 import numpy as np
 import pytest
 
-from mjchair.diagnosis.explain import search
+from mjchair.diagnosis.explain import choice, search
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
-from mjchair.diagnosis.fit.variant import Variant
+from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.effects import air_drag, wind
 from mjchair.errors import MjchairError
 
 
@@ -253,8 +254,9 @@ def test_a_rival_of_one_effect_is_weighed_against_what_that_effect_brings(
     looking.near_to = lambda tried: mock.patch.object(looking, "near", looking)
     near = {}
     of_all = np.resize([4.0, -4.0], 20)
-    ours = SimpleNamespace(total=1_000.0, chi2=np.full(20, 50.0), at_bound=())
-    theirs = SimpleNamespace(total=1_000.0 + worse, chi2=50.0 + worse / 20.0 + of_all, at_bound=())
+    bare = {"at_bound": (), "variant": Variant(())}
+    ours = SimpleNamespace(total=1_000.0, chi2=np.full(20, 50.0), **bare)
+    theirs = SimpleNamespace(total=1_000.0 + worse, chi2=50.0 + worse / 20.0 + of_all, **bare)
     both = Hypothesis((ROLLING, MOTOR), gain=64_000.0, score=63_990.0)
 
     def replacements(at, start, _):
@@ -267,3 +269,15 @@ def test_a_rival_of_one_effect_is_weighed_against_what_that_effect_brings(
     assert looking.own_gain(chosen, MOTOR) == 4_000.0
     assert [len(group) for group in looking.rivals(chosen)] == [0, int(stays)]
     assert near == {"rolling": False, "motor": True}  # around the fit: of the one that brings less
+
+
+@pytest.mark.parametrize(("sigmas", "there"), [(1.8, False), (12.0, True)])
+def test_a_wind_that_ends_nearly_still_is_no_wind(sigmas, there):
+    """It has a drag area, which then stands for the drag of the air; a drag has no such number."""
+    blows = Term(wind.EFFECT, wind.EFFECT.neutral(), ("x", "y", "drag_area"))
+    still = Term(air_drag.EFFECT, air_drag.EFFECT.neutral(), ("drag_area",))
+    for term, expected in ((blows, there), (still, True)):
+        ended = SimpleNamespace(
+            variant=Variant((), terms=(term,)), sigmas={term.effect.key: sigmas}
+        )
+        assert choice.is_there(ended) is expected

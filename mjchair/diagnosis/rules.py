@@ -225,6 +225,15 @@ def believable(*, std: float, change: float, width: float) -> bool:
     return std < min(SIZES * change, width / math.sqrt(12.0))
 
 
+def is_there(*, sigmas: float) -> bool:
+    """Whether an effect is there that is shaped by numbers which are no size of it.
+
+    Args:
+      sigmas: by which its sizes are away from neutral.
+    """
+    return sigmas > SIGMAS
+
+
 def needed(parameters: int) -> float:
     """Chi2 that this many further parameters, of one more effect, must bring."""
     return PENALTY * parameters + WORTH

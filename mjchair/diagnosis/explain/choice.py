@@ -47,6 +47,15 @@ class Choice:
     dropped: list[str] = field(default_factory=list)
 
 
+def is_there(fitted: Fitted) -> bool:
+    """Whether effects are there by their own sizes, and not by numbers that only shape them.
+
+    A wind has a drag area, so one that ends nearly still stands for the drag of the air.
+    """
+    shaped = [t for t in fitted.variant.terms if any(not p.sized for _, p in t.parameters)]
+    return all(rules.is_there(sigmas=fitted.sigmas[t.effect.key]) for t in shaped)
+
+
 def gain(base: Base, fitted: Fitted) -> float:
     """Drop of chi2 that the effects bring."""
     return base.plain.total - fitted.total

@@ -19,7 +19,7 @@ from scipy.special import logsumexp
 from mjchair.diagnosis.explain import calibration, hypotheses
 from mjchair.diagnosis.explain.calibration import NONE, OUTSIDE, Chosen, Weight
 from mjchair.diagnosis.explain.candidates import Start
-from mjchair.diagnosis.explain.choice import Choice, gain
+from mjchair.diagnosis.explain.choice import Choice, gain, is_there
 from mjchair.diagnosis.explain.column_ids import ForceGroup
 from mjchair.diagnosis.explain.gap import groups
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
@@ -85,10 +85,12 @@ def weights(base: Base, choice: Choice | None) -> dict[str, Weight]:
         NONE: Weight(math.log(PRIOR_NONE), 0.0, True),
         OUTSIDE: Weight(math.log(PRIOR_OUTSIDE), _outside(reduced) - 0.5 * _overstated(base), True),
     }
-    kept = _kept(base, choice)
+    kept, absent = _kept(base, choice), _absent(choice)
 
     def add(h: Hypothesis, prior: float) -> None:
         name = _name(h)
+        if name in absent:
+            return
         share = math.prod(keys[k] / everything for k in h.keys) * math.factorial(len(h.keys))
         gained = kept.get(name, h.gain - _overstated(base))
         evidence = _evidence(reduced, h, gained, starts)
@@ -112,6 +114,12 @@ def _kept(base: Base, choice: Choice | None) -> dict[str, float]:
     fits = {_name(tried.hypothesis): gain(base, tried.fitted) for tried in choice.tried}
     fits[_name(choice.hypothesis)] = gain(base, choice.fitted)
     return fits
+
+
+def _absent(choice: Choice | None) -> set[str]:
+    """The hypotheses whose fits end where an effect of theirs is not there."""
+    tried = choice.tried if choice is not None else []
+    return {_name(t.hypothesis) for t in tried if not is_there(t.fitted)}
 
 
 def _overstated(base: Base) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import hypotheses
 from mjchair.diagnosis.explain.candidates import Start
-from mjchair.diagnosis.explain.choice import Choice, Rival, gain
+from mjchair.diagnosis.explain.choice import Choice, Rival, gain, is_there
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.left_out import held_out, with_terms
@@ -340,7 +340,7 @@ class Search:
         return [
             Rival(t.hypothesis, t.fitted)
             for t in tried
-            if t is not None and _not_ruled_out(t, chosen, own)
+            if t is not None and is_there(t.fitted) and _not_ruled_out(t, chosen, own)
         ]
 
     def fit(self, hypothesis: Hypothesis, best: Tried | None = None) -> Tried | None:
@@ -522,11 +522,15 @@ def _of(hypothesis: Hypothesis, fits: Sequence[Rival]) -> Fitted | None:
 
 
 def believable(fitted: Fitted) -> bool:
-    """Whether every size is off its bounds and known better than beforehand."""
+    """Whether every size is there, off its bounds, and known better than beforehand."""
     sized = [(key, p) for term in fitted.variant.terms for key, p in term.parameters if p.sized]
-    return not fitted.at_bound and all(
-        rules.believable(std=fitted.std[key], change=p.change, width=p.high - p.low)
-        for key, p in sized
+    return (
+        is_there(fitted)
+        and not fitted.at_bound
+        and all(
+            rules.believable(std=fitted.std[key], change=p.change, width=p.high - p.low)
+            for key, p in sized
+        )
     )
 
 
