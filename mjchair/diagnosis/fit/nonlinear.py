@@ -31,8 +31,10 @@ from mjchair.errors import MjchairError
 
 Array = NDArray[np.float64]
 ROUNDS = 12  # at most, of Gauss-Newton
-HALVED = 5  # steps in a row that fail, each half of the one before, until none is believed
+SHORTEST = 1.0 / 32.0  # of a step: where less of it fails as well, none is believed
+SHORTER = (0.1, 0.5)  # of a step that fails: the least and the most that is tried next
 DONE = 1.0  # chi2 that a further round must promise
+ROUGH = 10.0  # chi2 promised, below which a fit ends where a round brings less than half of DONE
 
 
 @dataclass(kw_only=True)
@@ -70,7 +72,7 @@ def refit(
     nuisances: dict[ColumnId, Column] | None = None,
     rounds: int = ROUNDS,
 ) -> Fitted:
-    """Nonlinear fit of nuisances and effects within bounds: Gauss-Newton, steps halved that fail.
+    """Nonlinear fit of nuisances and effects within bounds: Gauss-Newton with a line search.
 
     Args:
       start: where to begin. before: a track of a chair that is not far.
@@ -89,20 +91,25 @@ def refit(
         nuisances = nuisance_columns(bench, before, start)
     best = _around(bench, start, before, nuisances)
     variant = _after_linear_step(bench, best)
-    failed = 0
+    share = 1.0  # of the linear step, that is tried
     for k in range(rounds):
         # columns that were made anew are followed once, however little they promise
-        if failed == HALVED or (best.total - best.promised < DONE and not (anew and k == 0)):
+        done = best.total - best.promised < DONE and not (anew and k == 0)
+        if done or share < SHORTEST:
             break
         try:
             here = _around(bench, variant, best.track, nuisances, best.std)
         except (MjchairError, np.linalg.LinAlgError):  # of a step to what no chair can be
-            failed, variant = failed + 1, _between(best.variant, variant)
-            continue
-        if here.total < best.total:
-            failed, best, variant = 0, here, _after_linear_step(bench, here)
-        else:  # a step too far
-            failed, variant = failed + 1, _between(best.variant, variant)
+            shorter = SHORTER[1]
+        else:
+            if here.total < best.total:
+                brought = best.total - here.total
+                share, best, variant = 1.0, here, _after_linear_step(bench, here)
+                if brought < 0.5 * DONE and here.total - here.promised < ROUGH:
+                    break
+                continue
+            shorter = _shorter(best, here.total, share)
+        share, variant = share * shorter, _between(best.variant, variant, shorter)
     return best
 
 
@@ -174,11 +181,25 @@ def _on_bound(p: Parameter, value: float) -> bool:
     return p.sized and value in (p.low, p.high) and not p.low == p.neutral == value
 
 
-def _between(one: Variant, other: Variant) -> Variant:
-    """Half way from one variant to another of the same terms."""
-    offsets = {n: 0.5 * (one.offsets.get(n, 0.0) + v) for n, v in other.offsets.items()}
+def _shorter(best: Fitted, total: float, share: float) -> float:
+    """How much of a step to try next that led to `total`, which is no better than the best.
+
+    Where the parabola has its least value that begins as the linear fit promises and goes through
+    what was found.
+
+    Args:
+      share: of the linear step, that was tried.
+    """
+    slope = share * (best.total - best.promised)
+    return float(np.clip(slope / max(total - best.total + 2.0 * slope, 1e-9), *SHORTER))
+
+
+def _between(one: Variant, other: Variant, share: float) -> Variant:
+    """This much of the way from one variant to another of the same terms."""
+    rest = 1.0 - share
+    offsets = {n: rest * one.offsets.get(n, 0.0) + share * v for n, v in other.offsets.items()}
     terms = tuple(
-        replace(a, values={n: 0.5 * (v + b.values[n]) for n, v in a.values.items()})
+        replace(a, values={n: rest * v + share * b.values[n] for n, v in a.values.items()})
         for a, b in zip(one.terms, other.terms, strict=True)
     )
     return replace(one, offsets=offsets, terms=terms)
