@@ -1,7 +1,9 @@
-"""The little by which a parameter is moved for a derivative."""
+"""The columns of a fit: by how little a parameter is moved for one, and which are rounding."""
 
+import numpy as np
 import pytest
 
+from mjchair.diagnosis.fit.system import taken_whole
 from mjchair.diagnosis.fit.variant import LEAST, NUDGE, Term, Variant, nudged
 from mjchair.effects import wheel_radius
 
@@ -23,3 +25,9 @@ def test_a_derivative_is_taken_over_a_few_standard_errors(at, std, by):
     beside, factor = nudged(Variant((), terms=(term,)), term, LEFT, std)
     assert beside.terms[0].values["left"] - at == pytest.approx(by)
     assert factor * by == pytest.approx(LEFT.change)
+
+
+def test_a_drag_is_no_rounding_where_channels_are_precise_and_the_chair_is_shaken():
+    """Places to 2 mm tell a drag to 2400 standard errors, all but 14 of which shaking may be."""
+    left, raw = np.array([198.0, 2.8e-10]), np.array([5.8e6, 2.2e5])  # a drag, an encoder's zero
+    assert taken_whole(left, raw).tolist() == [False, True]
