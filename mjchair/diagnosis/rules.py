@@ -27,6 +27,7 @@ SIGMAS = 4.0  # standard errors of a parameter away from neutral
 # what keeps a rival
 RIVAL_CHI2 = 10.0  # a rival this near, in chi2 with its penalty, is not ruled out
 FORM = 0.02  # of the gain: the form of no effect is better known (assumption)
+REPLACES = 0.5  # of what an effect brings: a replacement that misses more of it is not fitted
 FAR_BEHIND = 3.0  # times what keeps a rival: a fit that promises no more is not started again
 RIVAL_ERRORS = 2.0  # nor one this near in paired standard errors over windows
 # how hypotheses grow and shrink
@@ -311,6 +312,15 @@ def worth_refitting(*, behind: float, gain: float, rival_gain: float) -> bool:
         return True
     near = behind < 3.0 * RIVAL_ERRORS * math.sqrt(max(gain - rival_gain, 0.0))
     return near and rival_gain > 0.8 * gain
+
+
+def may_be_alike(*, less: float, own: float) -> bool:
+    """Whether the best replacement of an effect is fitted, though it is no rival by linear algebra.
+
+    Args:
+      less: chi2 that it brings less. own: that the effect brings beside the others.
+    """
+    return less < REPLACES * own
 
 
 def is_stuck(*, total: float, promised: float) -> bool:

@@ -226,6 +226,6 @@ def _around(base: Base, bench: Bench, fitted: Fitted) -> Reduced:
 
 
 def _penalty(starts: Sequence[Start]) -> float:
-    """What effects must earn, less those that are common; the deviance prices their parameters."""
+    """What effects must earn besides their parameters, which the deviance prices."""
     prior = Hypothesis(tuple(starts), 0.0, 0.0).prior
     return rules.WORTH * len(starts) - prior

@@ -20,7 +20,7 @@ from mjchair.diagnosis.explain.choice import Choice, Rival, gain, is_there
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.left_out import held_out, with_terms
-from mjchair.diagnosis.explain.near_fit import near_fit
+from mjchair.diagnosis.explain.near_fit import NearFit, near_fit
 from mjchair.diagnosis.explain.screening import Base, Found, Say, gap_after
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
@@ -33,7 +33,6 @@ LISTED = 6  # hypotheses of one size, until one can be
 REFITTED = 5  # rivals of an effect that is alone
 BESIDE = 3  # rivals of each effect that has others beside it
 SHARES = (0.875, 0.75, 0.625, 0.5, 0.375, 0.25, 0.125)  # of linear coefficients, for a new start
-HALF = 0.5  # of what an effect brings, that a rival misses by linear algebra: it is none
 SWAPS = 2  # times that a rival takes the place of the chosen hypothesis
 
 
@@ -118,6 +117,7 @@ class Search:
       base: around which. dropped: a line for each hypothesis that this chair cannot have.
       tried: every fit that was made. impossible: starts of those that this chair cannot have.
       again: of some of them, the fit with everything made anew around it.
+      near: the linear algebra that weighs; None: that of the base. latest: the last around a fit.
     """
 
     def __init__(self, base: Base, say: Say) -> None:
@@ -128,6 +128,7 @@ class Search:
         self.impossible: list[tuple[Start, ...]] = []
         self.again: list[Rival] = []
         self.near = near_fit(base, base.found) if base.found else None
+        self.latest: NearFit | None = None
 
     def best_single(self) -> Hypothesis | None:
         """The effect with which the search begins; None: none brings anything."""
@@ -163,14 +164,25 @@ class Search:
             return self.best_of(_with_one_more(self, best.hypothesis.starts), patient=False)
 
     @contextmanager
-    def near_to(self, tried: Tried) -> Iterator[None]:
-        """Weigh, and begin fits, by the linear algebra around a fit with everything made anew."""
+    def near_to(self, tried: Tried | None) -> Iterator[None]:
+        """Weigh, and begin fits, by the linear algebra around a fit with everything made anew.
+
+        Args:
+          tried: the fit; None: around the chair without effects.
+        """
         before = self.near
-        self.near = near_fit(self.base, Found(tried.hypothesis.starts, self.anew(tried)))
+        self.near = None if tried is None else self._around_fit(tried)
         try:
             yield
         finally:
             self.near = before
+
+    def _around_fit(self, tried: Tried) -> NearFit:
+        """The linear algebra around a fit; the last is kept, since it is asked for in a row."""
+        fitted = self.anew(tried)
+        if self.latest is None or self.latest.found.fitted is not fitted:
+            self.latest = near_fit(self.base, Found(tried.hypothesis.starts, fitted))
+        return self.latest
 
     def weigh(self, starts: Sequence[Start]) -> Hypothesis:
         """The hypothesis by linear algebra: around the effects that were found, if any."""
@@ -335,7 +347,7 @@ class Search:
         options = _replacements(self, start, others)
         near = [h for h in options if _close(here, h, own)]
         if others and not near:  # the first is always fitted: linear algebra tells little of it
-            near = [h for h in options[:1] if here.gain - h.gain < HALF * own]
+            near = [h for h in options[:1] if rules.may_be_alike(less=here.gain - h.gain, own=own)]
         tried = [self.fit(h, chosen) for h in near[: REFITTED if not others else BESIDE]]
         return [
             Rival(t.hypothesis, t.fitted)
@@ -400,11 +412,8 @@ class Search:
         """
         if near is not None and not rules.is_stuck(total=near.total, promised=near.promised):
             return near
-        kept, self.near = self.near, None
-        try:
+        with self.near_to(None):
             afar = self._from(hypothesis, 1.0, best)
-        finally:
-            self.near = kept
         fits = [f for f in (near, afar) if f is not None]
         return min(fits, key=attrgetter("total"), default=None)
 
