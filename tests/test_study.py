@@ -4,11 +4,17 @@ import numpy as np
 import pytest
 
 import mjchair
-from mjchair.diagnosis.data import first_state
+from mjchair.diagnosis.data import first_state, standstill
+from mjchair.diagnosis.data.study import Run
+from mjchair.diagnosis.data.windows import cut
 from mjchair.diagnosis.driven_run import drive_run
 from mjchair.diagnosis.replay import noise
 from mjchair.errors import MjchairError
 from mjchair.measurement import samples
+from mjchair.measurement.trial import Trial
+from mjchair.model import parts
+from mjchair.simulation.initial import Initial
+from mjchair.tire import block
 
 TIME = np.arange(0.0, 3.0, 0.02)
 
@@ -257,6 +263,55 @@ def test_a_clock_that_jumps_is_refused(tmp_path):
     (tmp_path / "a.csv").write_text("\n".join(lines) + "\n")
     (tmp_path / "study.toml").write_text('model = "manual"\n[[trial]]\nfile = "a.csv"\n')
     fails(tmp_path, "clock jumps")
+
+
+def _rolled(damping_time):
+    """Columns of a coast uphill that stops, by tires that damp their rocking for so long (s)."""
+    spec = mjchair.load_spec("manual", scene="ramp", grade=0.006)
+    for wheel in ("left_wheel", "right_wheel"):
+        parts.edit_tires(spec, block.ROLLING_DAMPING_TIME, lambda _: damping_time, (wheel,))
+    run = mjchair.simulate(spec, None, 10.0, initial={"speed": 0.7}, sample_rate=100.0)
+    names = ("left_wheel_speed", "right_wheel_speed")
+    return run.time, {name: run[name] for name in names}
+
+
+def _run(time, columns):
+    start = Initial()
+    return Run(Trial("a", time, columns, None, {}), "coast", False, start, frozenset())
+
+
+def test_how_a_chair_rocks_as_it_stops_is_in_no_window():
+    """Two chairs that only rock differently where they stop are alike in what is compared."""
+    (time, one), (_, other) = _rolled(0.25), _rolled(0.6)
+    run = _run(time, one)
+    apart = np.abs(one["left_wheel_speed"] - other["left_wheel_speed"])
+    windows = cut([run], 0.002)
+    rows = np.concatenate([w.rows for w in windows])
+    assert apart.max() > 0.015
+    assert apart[rows].max() < 0.25 * apart.max()
+    assert [w.index for w in windows] == list(range(len(windows)))
+    ((first, after),) = standstill.rests(run.trial)
+    kept = time[rows]
+    assert kept.min() < 1.0 and kept.max() > 9.0  # the chair still stands: that it does is told
+    assert not np.any((kept > first + 0.01) & (kept < after - 0.01))
+
+
+def test_a_chair_that_turns_back_or_begins_at_rest_does_not_come_to_rest():
+    time = np.arange(0.0, 8.0, 0.01)
+    back = 2.0 - 0.8 * time
+    starts = np.maximum(time - 3.0, 0.0)
+    for speed in (back, starts):
+        run = _run(time, {"left_wheel_speed": speed, "right_wheel_speed": speed})
+        assert standstill.rests(run.trial) == []
+        rows = np.concatenate([w.rows for w in cut([run], 0.002)])
+        assert np.array_equal(rows, np.flatnonzero(time >= 0.2))
+
+
+def test_a_stop_is_said(tmp_path):
+    speed = np.maximum(3.0 - 2.0 * TIME, 0.0)
+    columns = {"left_wheel_speed": speed, "right_wheel_speed": speed}
+    (said,) = [n for n in mjchair.read_study(write(tmp_path, columns)).notes if "rest" in n]
+    assert "a at 1.5 s" in said
 
 
 def test_unknown_keys_are_named(tmp_path):

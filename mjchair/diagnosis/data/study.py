@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import mujoco
 
-from mjchair.diagnosis.data import trial_checks, unit_checks
+from mjchair.diagnosis.data import standstill, trial_checks, unit_checks
 from mjchair.errors import MjchairError
 from mjchair.measurement.trial import Trial, check_columns
 from mjchair.model.load import Load
@@ -113,7 +113,7 @@ def make_study(
         trial, noticed = _checked(run.trial, axle)
         checked.append(replace(run, trial=trial))
         said += noticed
-    said += _without_heading(checked)
+    said += _without_heading(checked) + _coming_to_rest(checked)
     return Study(
         spec=spec,
         runs=tuple(checked),
@@ -159,5 +159,20 @@ def _checked(trial: Trial, axle: RearAxle) -> tuple[Trial, list[str]]:
         trial, noticed = stage(trial)
         said += noticed
     trial_checks.check(trial)
+def _coming_to_rest(runs: list[Run]) -> list[str]:
+    """A note on what is left out where runs come to rest."""
+    stops = [
+        f"{run.trial.name} at {(first + standstill.BEFORE):.1f} s"
+        for run in runs
+        for first, _ in standstill.rests(run.trial)
+    ]
+    if not stops:
+        return []
+    return [
+        f"comes to rest: {', '.join(stops)}; how a chair rocks on its tires then is not known, and "
+        f"{standstill.ROCKS:g} s are left out from there, or what there is until it moves again"
+    ]
+
+
     unit_checks.check(trial, axle)
     return trial, said

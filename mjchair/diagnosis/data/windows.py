@@ -10,17 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.diagnosis.data.first_state import stops
+from mjchair.diagnosis.data.standstill import rests
 from mjchair.diagnosis.data.study import Run
 
 Array = NDArray[np.float64]
 
 LENGTH = 2.0  # s, of a window
 LEAD = 0.2  # s
+FEWEST = 5  # samples of a window
 
 
 @dataclass(frozen=True)
@@ -42,19 +45,33 @@ class Window:
 
 
 def cut(runs: Sequence[Run], step: float, length: float = LENGTH) -> list[Window]:
-    """Cut every run into windows of about `length` (s), on a grid of simulation steps (s)."""
-    windows = []
+    """Cut every run into windows of about `length` (s), on a grid of simulation steps (s).
+
+    What a chair does as it comes to rest is in none of them (standstill.py).
+    """
+    windows: list[Window] = []
     for i, run in enumerate(runs):
-        time = run.trial.time
-        begin, end = float(time[0]), stops(run) or float(time[-1])
-        count = max(1, round((end - begin) / length))
-        inner = begin + np.round((end - begin) * np.arange(1, count) / count / step) * step
-        edges = np.r_[begin, inner, end + step]
-        for k in range(count):
-            first = edges[k] + (LEAD if k == 0 else 0.0)
-            rows = np.flatnonzero((time >= first) & (time < edges[k + 1]))
-            if rows.size < 5:
-                continue
-            start = begin if k == 0 else edges[k] - LEAD
-            windows.append(Window(i, k, float(start), float(first), float(edges[k + 1]), rows))
+        time, mine = run.trial.time, list[Window]()
+        for edges in _edges(run, step, length):
+            for begin, end in pairwise(edges):
+                at_start = begin == time[0]
+                first = begin + (LEAD if at_start else 0.0)
+                rows = np.flatnonzero((time >= first) & (time < end))
+                if rows.size < FEWEST:
+                    continue
+                start = begin - (0.0 if at_start else LEAD)
+                mine.append(Window(i, len(mine), float(start), float(first), float(end), rows))
+        windows += mine
     return windows
+
+
+def _edges(run: Run, step: float, length: float) -> list[Array]:
+    """Edges (s) of the windows of every stretch of a run, between which it comes to rest."""
+    time = run.trial.time
+    begin, out = float(time[0]), []
+    for stop, onward in [*rests(run.trial), (stops(run) or float(time[-1]), np.inf)]:
+        count = max(1, round((stop - begin) / length))
+        inner = begin + np.round((stop - begin) * np.arange(1, count) / count / step) * step
+        out.append(np.r_[begin, inner, stop + step])
+        begin += np.ceil((onward - begin) / step) * step
+    return out

@@ -8,18 +8,21 @@ estimated from the study itself, and said so.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mjchair.diagnosis.data.standstill import still_stretches
 from mjchair.diagnosis.data.study import Study
 from mjchair.measurement.sensors import sensor
+from mjchair.measurement.trial import Trial
 
 Array = NDArray[np.float64]
 
 STILL = 0.5  # s, the shortest still stretch that is used
+SETTLES = 0.3  # s, at its start, that are not
 EDGES = (3.0, 6.0, 10.0)  # Hz, upper edges of the bands in which a study shows its noise
 
 
@@ -123,7 +126,7 @@ def _still(study: Study, channel: str) -> tuple[float, float] | None:
     """Scatter and lag-one correlation where the chair stands still; None: it never does."""
     stretches = []
     for run in (study.runs[i] for i in telling(study, channel)):
-        for stretch in _still_rows(run.trial.time, run.trial.channels):
+        for stretch in _still_rows(run.trial):
             v = run.trial.channels[channel][stretch]
             v = v[~np.isnan(v)]
             if v.size >= 25:
@@ -138,30 +141,10 @@ def _still(study: Study, channel: str) -> tuple[float, float] | None:
     return float(np.sqrt(power)), rho
 
 
-def _still_rows(time: Array, channels: Mapping[str, Array]) -> list[NDArray[np.int64]]:
-    moving = np.zeros(time.size, bool)
-    seen = False
-    for name, limit in (
-        ("left_wheel_speed", 0.05),
-        ("right_wheel_speed", 0.05),
-        ("velocity.x", 0.02),
-    ):
-        if name in channels:
-            seen = True
-            filled = np.interp(time, time[~np.isnan(channels[name])], _there(channels[name]))
-            width = max(3, int(0.1 / max(float(np.median(np.diff(time))), 1e-4)))
-            smooth = np.convolve(filled, np.ones(width) / width, mode="same")
-            moving |= np.abs(smooth) > limit
-    if not seen:
-        return []
-    edges = np.flatnonzero(np.diff(np.r_[1, moving.astype(int), 1]))
-    out = []
-    for a, b in zip(edges[::2], edges[1::2], strict=False):
-        if time[b - 1] - time[a] > STILL + 0.3:
-            rows = np.arange(a, b)
-            out.append(rows[time[rows] > time[a] + 0.3])
+def _still_rows(trial: Trial) -> list[NDArray[np.int64]]:
+    """Samples of every stretch in which the chair stands, once it has settled."""
+    time, out = trial.time, []
+    for first, after in still_stretches(trial, STILL + SETTLES):
+        rows = np.arange(first, after)
+        out.append(rows[time[rows] > time[first] + SETTLES])
     return out
-
-
-def _there(values: Array) -> Array:
-    return np.asarray(values[~np.isnan(values)])
