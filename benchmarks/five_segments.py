@@ -340,7 +340,7 @@ def write(case: Case, folder: Path, seed: int = 0) -> None:
     """The study folder."""
     folder.mkdir(parents=True, exist_ok=True)
     trials, heads = tables(case, seed)
-    text = ['model = "manual"', "[noise]"]
+    text = ['model = "manual"', 'torque = "measured"', "[noise]"]
     text += [f'"{name}" = {size}' for name, size in NOISE.items()]
     for name, columns in trials.items():
         rows = np.column_stack(list(columns.values())).tolist()

@@ -30,11 +30,10 @@ SECONDS = 4.2
 KEY = ParameterId("rider_motion", "mass")
 
 
-@pytest.fixture(scope="module")
-def push():
+def pushed(hidden, torque_measured=False):
     """A bench of one push, its first track, and the variant in which a mass (kg) moves."""
     spec = mjchair.load_spec("manual")
-    columns = tables(Case(Hidden(rolling=0.0), coasts=0, pushes=1), seed=3)[0]["push_1"]
+    columns = tables(Case(hidden, coasts=0, pushes=1), seed=3)[0]["push_1"]
     columns = {name: values[columns["time"] < SECONDS] for name, values in columns.items()}
     time = columns.pop("time")
     driven = {name: columns.pop(name) for name in ("left_wheel", "right_wheel")}
@@ -43,13 +42,19 @@ def push():
     made = Run(trial, "push", False, Initial(speed=0.9), frozenset({"heading"}))
     study = make_study(spec, [made], NOISE)
     simulator = WindowSimulator(study, threads=1)
-    bench = Bench(simulator, noise.estimate(study), nuisances(study.channels, {}))
+    known = nuisances(study.channels, {}, torque_measured)
+    bench = Bench(simulator, noise.estimate(study), known)
     effect = rider_motion.MEASURED.on(spec)
 
     def moving(mass):
         return Variant(bench.nuisances, terms=(Term(effect, {"mass": mass}, ("mass",)),))
 
     return bench, track(simulator, simulator.base, bench.noise), moving
+
+
+@pytest.fixture(scope="module")
+def push():
+    return pushed(Hidden())
 
 
 def test_the_fit_ends_at_the_same_mass_from_starts_25_kg_apart(push):
@@ -68,6 +73,16 @@ def test_the_fit_ends_at_the_same_mass_from_starts_25_kg_apart(push):
         assert all(abs(by) < 1.5 for by in end.variant.offsets.values())
         soft = [end.step[end.system.places[RoughlyKnown(name)]] for name in ("rocking", "slip")]
         assert all(-4.0 < by < -1.5 for by in soft)
+
+
+def test_the_interval_of_the_mass_knows_that_torques_were_measured():
+    """Rims pushed with a tenth more than was measured: mass, torque and moving mass go together."""
+    hidden = Hidden(gain_left=0.1, gain_right=0.1)
+    bench, first, moving = pushed(hidden, torque_measured=True)
+    end = refit(bench, moving(70.0), first)
+    mass, error = end.variant.terms[0].values["mass"], end.std[KEY]
+    assert abs(mass - 75.0) < 2.0 * error < 15.0
+    assert end.variant.offsets["torque"] > 0.5
 
 
 def test_what_is_roughly_known_is_in_the_chair_before_a_person_moves_on_it(push):

@@ -337,6 +337,12 @@ def test_a_measured_torque_lags_behind_no_motor(tmp_path):
     assert tried('model = "manual"\ntorque = "measured"\n') == set()
     smartwheel = mjchair.read_study(samples.folder() / "smartwheel")
     assert not motors & {effect.name for effect in study_effects(smartwheel)}
+    # the gain of a sensor is only roughly known, and that of a command is no such number
+    known = 'model = "manual"\n{}[nuisance]\ntorque = 0.02\n'
+    measured = known.format('torque = "measured"\n')
+    mjchair.read_study(write(tmp_path, wheels() | torque, head=measured))
+    for head, columns in ((known.format(""), wheels() | torque), (measured, wheels())):
+        fails(write(tmp_path, columns, head=head), "unknown nuisance 'torque'")
     fails(write(tmp_path, wheels(), head='torque = "mesured"\n'), "did you mean 'measured'")
 
 

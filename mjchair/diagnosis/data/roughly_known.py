@@ -102,6 +102,15 @@ def _slip(spec: mujoco.MjSpec, value: float) -> None:
     parts.edit_tires(spec, block.LONGITUDINAL_FACTOR, stiffer, parts.REAR)
 
 
+def _torque(spec: mujoco.MjSpec, value: float) -> None:
+    """Gain of the torques of both rear wheels: what calibrates one sensor calibrates the other."""
+    for wheel in parts.REAR:
+        actuator = parts.named(spec.actuators, wheel, "actuator")
+        gain = list(actuator.gainprm)
+        gain[0] *= 1.0 + value
+        actuator.gainprm = gain
+
+
 # Relative. How much tires give way downwards and along their heading is an assumption in every
 # model that ships, and nobody measures it on a chair. At the wall of three they do not at all.
 COMPLIANCE = 1.0 / 3.0
@@ -118,15 +127,23 @@ MECHANICAL = (
     Nuisance("slip", COMPLIANCE, "1", _slip, linear=True),
     Nuisance("rolling_radius", 0.0015, "m", _rolling_radius),
 )
+# of torques that were measured: gains of uncalibrated sensors are within 10 %, assumed. Mass, gain
+# and the mass that moves on the chair grow alike without a trace: 10 % of gain are 10 % of each
+TORQUE = Nuisance("torque", 0.05, "1", _torque)
 
 
-def nuisances(channels: tuple[str, ...], given: Mapping[str, float]) -> tuple[Nuisance, ...]:
+def nuisances(
+    channels: tuple[str, ...], given: Mapping[str, float], driven_as_measured: bool = False
+) -> tuple[Nuisance, ...]:
     """The nuisances of a study, with the standard deviations that it gives.
+
+    Args:
+      driven_as_measured: whether torques of the rear wheels come from sensors.
 
     Raises:
       MjchairError: a name that is not a nuisance.
     """
-    every = list(MECHANICAL)
+    every = [*MECHANICAL, TORQUE] if driven_as_measured else list(MECHANICAL)
     for channel in channels:
         kind = sensor(channel)
         if kind.bias is not None:

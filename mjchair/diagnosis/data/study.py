@@ -16,6 +16,7 @@ from mjchair.errors import MjchairError
 from mjchair.measurement.trial import Trial, check_columns
 from mjchair.model.load import Load
 from mjchair.model.rolling import RearAxle, rear_axle
+from mjchair.model.wheels import WHEELS
 from mjchair.simulation.initial import Initial
 
 
@@ -80,6 +81,12 @@ class Study:
         """Scalar channels that some run measured, in a fixed order."""
         measured = {c for run in self.runs for c in run.trial.channels}
         return tuple(sorted(measured))
+
+    @property
+    def driven_as_measured(self) -> bool:
+        """Whether the torques of rear wheels were measured, and drive a run."""
+        driven = [run.trial.inputs.controls for run in self.runs if run.trial.inputs is not None]
+        return self.torque_measured and any(set(WHEELS[:2]) & set(names) for names in driven)
 
     @property
     def fitted(self) -> tuple[int, ...]:
@@ -152,13 +159,6 @@ def _without_heading(runs: list[Run]) -> list[str]:
     ]
 
 
-def _checked(trial: Trial, axle: RearAxle) -> tuple[Trial, list[str]]:
-    """The trial as it is used, and what was noticed."""
-    said = []
-    for stage in (trial_checks.measured_part, trial_checks.without_dead, trial_checks.other_side):
-        trial, noticed = stage(trial)
-        said += noticed
-    trial_checks.check(trial)
 def _coming_to_rest(runs: list[Run]) -> list[str]:
     """A note on what is left out where runs come to rest."""
     stops = [
@@ -174,5 +174,12 @@ def _coming_to_rest(runs: list[Run]) -> list[str]:
     ]
 
 
+def _checked(trial: Trial, axle: RearAxle) -> tuple[Trial, list[str]]:
+    """The trial as it is used, and what was noticed."""
+    said = []
+    for stage in (trial_checks.measured_part, trial_checks.without_dead, trial_checks.other_side):
+        trial, noticed = stage(trial)
+        said += noticed
+    trial_checks.check(trial)
     unit_checks.check(trial, axle)
     return trial, said

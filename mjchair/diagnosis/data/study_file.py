@@ -137,14 +137,16 @@ def read_study(folder: str | os.PathLike[str]) -> Study:
         if channel not in measured
     ]
     study = make_study(spec, runs, noise, entry.nuisance, notes, str(path.parent))
-    nuisances(with_copied_wheels(study).channels, study.nuisance)  # an unknown one is refused
-    return replace(
+    known = replace(
         study,
         process=process,
         indoors=entry.indoors,
         torque_measured=_measured(entry),
         material=entry.material.force if entry.material is not None else None,
     )
+    channels = with_copied_wheels(known).channels
+    nuisances(channels, known.nuisance, known.driven_as_measured)  # an unknown one is refused
+    return known
 
 
 def _measured(entry: StudyEntry) -> bool:

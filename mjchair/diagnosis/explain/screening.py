@@ -94,7 +94,7 @@ def prepare(
     # at rest the accelerometer showed its bias
     if any(first_state.stops(run) for run in study.runs):
         given.setdefault("bias:imu_accelerometer.x", AT_REST)
-    nuisances = roughly_known.nuisances(study.channels, given)
+    nuisances = roughly_known.nuisances(study.channels, given, study.driven_as_measured)
     return Bench(simulator, noise_left.refined(simulator, first, known), nuisances), first
 
 
