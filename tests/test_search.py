@@ -158,6 +158,21 @@ def test_an_effect_that_helped_a_stuck_fit_is_dropped(fits, monkeypatch):
     assert looking.fit(ONE).fitted.total == 1106.0
 
 
+@pytest.mark.parametrize(("rival", "takes"), [(1108.0, True), (1108.5, False), (1111.0, False)])
+def test_a_rival_takes_the_place_only_once_both_are_made_anew(rival, takes, fits, monkeypatch):
+    """With old columns rolling resistance is 2 ahead of a motor; with new ones that may turn."""
+    motor = Hypothesis((MOTOR,), gain=500.0, score=490.0)
+    fits.answers[("rolling", "track of rolling")] = fit(1108.4, "rolling")
+    fits.answers[("motor", "track of motor")] = fit(rival, "motor")
+    monkeypatch.setattr(search, "believable", lambda _: True)
+    looking = searching()
+    chosen = search.Tried(ONE, fit(1110.0, "rolling"))
+    others = {"rolling": [search.Tried(motor, fit(1112.0, "motor"))], "motor": [chosen]}
+    monkeypatch.setattr(looking, "rivals", lambda best: [others[best.hypothesis.keys[0]]])
+    best, _ = looking.against_rivals(chosen)
+    assert best.hypothesis is (motor if takes else ONE)
+
+
 def test_a_second_effect_is_weighed_around_the_fit_of_the_first(fits, monkeypatch):
     """Around the chair without effects, the pair that is right is not even listed."""
     fits.answers.update(

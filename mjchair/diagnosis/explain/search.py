@@ -308,21 +308,32 @@ class Search:
     def against_rivals(self, chosen: Tried) -> tuple[Tried, list[list[Rival]]]:
         """The best of the chosen hypothesis and what could stand in its places, with its rivals.
 
-        Linear algebra chose; a rival that fits better once both are fitted takes the place.
+        Linear algebra chose; a rival that fits better once both are made anew takes the place.
         """
         rivals = self.rivals(chosen)
         for _ in range(SWAPS):
-            others = [Tried(r.hypothesis, r.fitted) for group in rivals for r in group]
-            better = min(
-                (o for o in others if believable(o.fitted)),
-                key=attrgetter("price"),
-                default=chosen,
-            )
-            if better.price >= chosen.price:
+            better = self._better_rival(chosen, [r for group in rivals for r in group])
+            if better is None:
                 break
             chosen = self.without_needless(better)
             rivals = self.rivals(chosen)
         return chosen, rivals
+
+    def _better_rival(self, chosen: Tried, rivals: Sequence[Rival]) -> Tried | None:
+        """The best of the rivals that are better than the choice; None: none is.
+
+        Columns that were made without the effects are wrong by some chi2, more for one hypothesis
+        than for another, so of those that are near everything is made anew.
+        """
+        tried = [Tried(r.hypothesis, r.fitted) for r in rivals if believable(r.fitted)]
+        near = [t for t in tried if t.price < chosen.price + rules.RIVAL_CHI2]
+        if not near:
+            return None
+        best = min(near, key=self._price_anew)
+        return best if self._price_anew(best) < self._price_anew(chosen) else None
+
+    def _price_anew(self, tried: Tried) -> float:
+        return replace(tried, fitted=self.anew(tried)).price
 
     def rivals(self, chosen: Tried) -> list[list[Rival]]:
         """For every effect of the choice: what could stand in its place, best first.
