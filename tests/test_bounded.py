@@ -1,0 +1,53 @@
+"""The bounded linear fit against bounded least squares of another make."""
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.column_ids import ParameterId, RoughlyKnown
+from mjchair.diagnosis.fit.system import System
+
+NUISANCES, EFFECTS = 12, 2
+
+
+def made(seed):
+    """A system whose columns are much alike and pull hard, and its rows (n, p) and residual."""
+    rng = np.random.default_rng(seed)
+    p = NUISANCES + EFFECTS
+    alike = rng.standard_normal((60, 4)) @ rng.standard_normal((4, p))
+    rows = 3.0 * (alike + 0.1 * rng.standard_normal((60, p)))
+    residual = 10.0 * rng.standard_normal(60) + rows @ (4.0 * rng.standard_normal(p))
+    names = [RoughlyKnown(f"n{k}") for k in range(NUISANCES)]
+    names += [ParameterId("effect", f"p{k}") for k in range(EFFECTS)]
+    system = System(
+        columns=names,
+        nuisance=NUISANCES,
+        G=(rows.T @ rows)[None],
+        b=(rows.T @ residual)[None],
+        c=np.array([residual @ residual]),
+        run=np.zeros(1, int),
+        back=rng.uniform(-2.0, 2.0, NUISANCES),
+    )
+    return system, rows, residual
+
+
+@pytest.mark.parametrize("which", [[], [NUISANCES], [NUISANCES, NUISANCES + 1]])
+def test_walls_end_at_the_least_chi2(which):
+    for seed in range(40):
+        system, rows, residual = made(seed)
+        steps, total = bounded.solve(system, [0], which)
+        use = [*range(NUISANCES), *which]
+        prior = np.eye(NUISANCES, len(use))
+        wall = np.full(len(use), np.inf)
+        wall[:NUISANCES] = bounded.WALL
+        centre = np.r_[system.back, np.zeros(len(which))]
+        best = lsq_linear(
+            np.vstack([rows[:, use], prior]),
+            np.r_[residual, -system.back],
+            (-wall - centre, wall - centre),
+            method="trf",
+            tol=1e-12,
+        )
+        assert total == pytest.approx(2.0 * best.cost, rel=1e-4)
+        assert np.abs(steps[:NUISANCES] + system.back).max() < bounded.WALL + 1e-6
