@@ -87,6 +87,10 @@ def test_a_gap_needs_the_family_and_one_large_test():
     assert rules.gap_exists(0.001, 6.0)
     assert not rules.gap_exists(0.02, 6.0)
     assert not rules.gap_exists(0.001, rules.LEAST)
+    # beside effects that bring very much, the rounding of their columns is no gap
+    assert rules.gap_exists(0.001, 6.0, gain=1e5)
+    assert not rules.gap_exists(0.001, 6.0, gain=331_000.0)
+    assert rules.gap_exists(0.001, 10.0, gain=331_000.0)
 
 
 @pytest.mark.parametrize(

@@ -101,12 +101,14 @@ def test_gap(
     system: System,
     reduced: Reduced,
     skip: Sequence[str] = (),
+    gain: float = 0.0,
     seed: int = 0,
 ) -> Gap:
     """Test what is left.
 
     Args:
       reduced: with everything that is accepted eliminated. skip: effects that are in already.
+      gain: chi2 that these bring.
     """
     tested = {
         group: which
@@ -124,7 +126,7 @@ def test_gap(
     total = sum(c.total for i, c in enumerate(system.cells) if i in mine)
     dof = sum(c.total_dof for i, c in enumerate(system.cells) if i in mine)
     ordered = sorted([*tests, *cells], key=lambda t: -t.sigmas)
-    exists = rules.gap_exists(p, sigmas)
+    exists = rules.gap_exists(p, sigmas, gain)
     return Gap(
         tests=ordered,
         p=p,

@@ -235,4 +235,5 @@ def gap_after(base: Base, fitted: Fitted) -> Gap:
     bench = base.bench
     system = system_around(base, bench, fitted)
     keys = [t.effect.key for t in fitted.variant.terms]
-    return gaps.test_gap(bench, system, bounded.reduce(system, bench.windows), keys)
+    gain = base.plain.total - fitted.total
+    return gaps.test_gap(bench, system, bounded.reduce(system, bench.windows), keys, gain)
