@@ -529,7 +529,7 @@ def diagnosed(bed: Bed, y: Sequence[Array]) -> dict[str, Any]:
     }
     if choice is not None:
         line |= {
-            "gap_left": choice.after[-1].exists,
+            "gap_left": choice.after.exists,
             "rivals": sum(len(group) for group in choice.rivals),
             "sigmas": min(choice.fitted.sigmas.values()),
         }

@@ -360,9 +360,9 @@ def one(made: Made, out: Path, known: bool = False) -> dict:
     }
     if choice is not None:
         line |= {
-            "gap_left": choice.after[-1].exists,
+            "gap_left": choice.after.exists,
             "rivals": [[r.hypothesis.keys for r in group] for group in choice.rivals],
-            "closure": closure(gap, base, choice.fitted, choice.after[-1]),
+            "closure": closure(gap, base, choice.fitted, choice.after),
             "sigmas": choice.fitted.sigmas,
         }
     return line

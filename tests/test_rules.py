@@ -304,6 +304,7 @@ def test_a_fit_is_stuck_where_its_own_step_promises_what_decides():
     [
         (9.9, 100.0, 9.0, False, True),
         (100.0, 1000.0, 1.9, False, True),
+        (501.0, 1000.0, 0.9, False, False),  # no scatter makes a rival of half an explanation
         (10.0, 400.0, 2.0, False, False),
         (199.0, 10_000.0, 9.0, False, True),  # 2 % of the gain is a matter of form
         (201.0, 10_000.0, 9.0, False, False),

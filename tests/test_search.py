@@ -67,6 +67,7 @@ def searching():
         reduced=SimpleNamespace(total=2000.0),
         around=SimpleNamespace(track="as given", variant=Variant(())),
         found=None,
+        best=None,
     )
     return search.Search(base, lambda line: None)
 
@@ -194,9 +195,35 @@ def test_a_second_effect_is_weighed_around_the_fit_of_the_first(fits, monkeypatc
     monkeypatch.setattr(search.Search, "is_worth", lambda *_: True)
     looking = searching()
     looking.base.starts = ()
-    best, after = search._grown(looking)
+    best, left = search._grown(looking)
     assert best.hypothesis is BOTH and best.fitted is both
-    assert [gap.exists for gap in after] == [True, False] and looking.near is None
+    assert not left.exists and looking.near is None
+
+
+def test_a_single_effect_may_be_what_the_search_for_noise_left_over(fits, monkeypatch):
+    """By linear algebra rolling resistance is best; beside it a motor ended as the only one."""
+    motor = fit(1110.0, "motor")
+    fits.answers.update(
+        {
+            ("rolling", "as given"): fit(1500.0, "rolling"),
+            ("rolling", "track of rolling"): fit(1500.0, "rolling"),
+            ("motor", "track of motor+rolling"): motor,
+        }
+    )
+    monkeypatch.setattr(
+        search.hypotheses, "weigh", lambda _, starts: Hypothesis(tuple(starts), 870.0, 850.0)
+    )
+    monkeypatch.setattr(search.hypotheses, "singles", lambda *_: [ONE])
+    monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
+    monkeypatch.setattr(search, "believable", lambda _: True)
+    monkeypatch.setattr(search, "gap_after", lambda _, f: SimpleNamespace(exists=f is not motor))
+    looking = searching()
+    looking.base.starts = ()
+    both = fit(1105.0, "rolling", "motor")
+    both.sigmas = {"rolling": 0.5, "motor": 30.0}
+    looking.base.best = SimpleNamespace(starts=(ROLLING, MOTOR), fitted=both)
+    best, left = search._grown(looking)
+    assert best.hypothesis.keys == ("motor",) and best.fitted is motor and not left.exists
 
 
 def test_a_fit_that_cannot_come_near_the_best_is_not_started_again(fits):
@@ -228,7 +255,7 @@ def test_one_window_neither_rules_a_rival_out_nor_keeps_it(worse, stays):
         Hypothesis((MOTOR,), 400.0, 390.0),
         SimpleNamespace(total=theirs.sum(), chi2=theirs, at_bound=()),
     )
-    assert search._not_ruled_out(rival, chosen, 2000.0) == stays
+    assert search._not_ruled_out(rival, chosen, 12_000.0) == stays
 
 
 def test_where_no_second_effect_stands_no_third_is_tried(fits, monkeypatch):

@@ -3,9 +3,13 @@
 import numpy as np
 import pytest
 
+import mjchair
+from mjchair.diagnosis.data import roughly_known
+from mjchair.diagnosis.fit.column_ids import ParameterId, RoughlyKnown
+from mjchair.diagnosis.fit.parameter_columns import shared_columns
 from mjchair.diagnosis.fit.system import taken_whole
 from mjchair.diagnosis.fit.variant import LEAST, NUDGE, Term, Variant, nudged
-from mjchair.effects import wheel_radius
+from mjchair.effects import library, wheel_radius
 
 LEFT = wheel_radius.EFFECT.parameter("left")  # 3 mm is worth finding, 50 mm the bound
 
@@ -31,3 +35,30 @@ def test_a_drag_is_no_rounding_where_channels_are_precise_and_the_chair_is_shake
     """Places to 2 mm tell a drag to 2400 standard errors, all but 14 of which shaking may be."""
     left, raw = np.array([198.0, 2.8e-10]), np.array([5.8e6, 2.2e5])  # a drag, an encoder's zero
     assert taken_whole(left, raw).tolist() == [False, True]
+
+
+@pytest.mark.parametrize(
+    "nuisance", [n for n in roughly_known.MECHANICAL if n.same], ids=lambda n: n.name
+)
+def test_what_is_roughly_known_moves_the_chair_as_the_effect_does_that_is_the_same(nuisance):
+    name, *parameters = nuisance.same
+    by = 0.5 * nuisance.std
+    one, other = mjchair.load_spec("manual"), mjchair.load_spec("manual")
+    nuisance.edit(one, by)
+    library.find(name).apply(other, dict.fromkeys(parameters, by))
+    assert one.to_xml() == other.to_xml()
+
+
+def test_data_do_not_tell_a_wheel_from_what_is_roughly_known_of_both():
+    """Where one wheel alone is asked about, they do."""
+    both = Term(wheel_radius.EFFECT, {"left": 0.002, "right": 0.0}, ("left", "right"))
+    one = Term(wheel_radius.EFFECT, {"left": 0.002, "right": 0.0}, ("left",))
+    columns = {
+        ParameterId("wheel_radius", side): [np.full((3, 1), answer)]
+        for side, answer in (("left", 4.0), ("right", -2.0))
+    }
+    known = roughly_known.nuisances((), {"rolling_radius": 0.0015})
+    made = shared_columns(Variant(known, terms=(both,)), columns)
+    assert list(made) == [RoughlyKnown("rolling_radius")]
+    assert made[RoughlyKnown("rolling_radius")][0] == pytest.approx(0.5 * (4.0 - 2.0))
+    assert not shared_columns(Variant(known, terms=(one,)), columns)

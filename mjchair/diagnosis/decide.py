@@ -57,7 +57,7 @@ EVENT = "event"  # something that happened once: no effect, but a rival of effec
 
 def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     """What the stages say together."""
-    closed = closure(gap, base, choice.fitted, choice.after[-1]) if choice else 0.0
+    closed = closure(gap, base, choice.fitted, choice.after) if choice else 0.0
     probability = probabilities(base, choice)
     stands = standing(base, choice, closed, probability) if choice else None
     said = rules.verdict(gap.exists, stands)
@@ -77,7 +77,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     ):
         said = Verdict.NONE
     named = choice if said in (Verdict.NAMED, Verdict.AMBIGUOUS) else None
-    left = missing(choice.after[-1] if choice else gap)
+    left = missing(choice.after if choice else gap)
     undecided = named if said == Verdict.AMBIGUOUS else None
     once = bool(stands and stands.once)
     plan, unplanned = _plan(base, undecided, once) if undecided else (None, [])
@@ -119,7 +119,7 @@ def standing(
     fitted = choice.fitted
     return rules.Standing(
         closure=closed,
-        gap_left=choice.after[-1].exists,
+        gap_left=choice.after.exists,
         gain_by_run=held_out_gain(base, fitted),
         gain_by_manoeuvre=held_out_gain(base, fitted, "manoeuvre"),
         sigmas=tuple(fitted.sigmas.values()),
@@ -293,7 +293,7 @@ def _summary(base: Base, gap: Gap, choice: Choice | None) -> GapSummary:
         after=_rms(_slow(choice.fitted.system, windows)[0], dof) if choice else None,
         scope=f"{who}: rms of the whitened residual below {BAND:g} Hz",
         p_value=gap.p,
-        p_value_after=choice.after[-1].p if choice else None,
+        p_value_after=choice.after.p if choice else None,
     )
 
 

@@ -27,7 +27,7 @@ SIGMAS = 4.0  # standard errors of a parameter away from neutral
 # what keeps a rival
 RIVAL_CHI2 = 10.0  # a rival this near, in chi2 with its penalty, is not ruled out
 FORM = 0.02  # of the gain: the form of no effect is better known (assumption)
-REPLACES = 0.5  # of what an effect brings: a replacement that misses more of it is not fitted
+REPLACES = 0.5  # of what an effect brings: what misses more of it does not stand in its place
 FAR_BEHIND = 3.0  # times what keeps a rival: a fit that promises no more is not started again
 RIVAL_ERRORS = 2.0  # nor one this near in paired standard errors over windows
 # how hypotheses grow and shrink
@@ -349,10 +349,13 @@ def stays_a_rival(*, behind: float, gain: float, errors: float, beyond_bound: bo
 
     Args:
       behind: chi2 with penalties by which it fits worse. gain: chi2 that the chosen brings.
-      errors: `behind` in paired standard errors over windows. beyond_bound: it alone would have
-        to be larger than it can be.
+      errors: `behind` in paired standard errors over windows; they speak for no rival that misses
+        most of what the chosen brings. beyond_bound: it alone would have to be larger than it can
+        be.
     """
-    return not beyond_bound and (behind < max(RIVAL_CHI2, FORM * gain) or errors < RIVAL_ERRORS)
+    near = behind < max(RIVAL_CHI2, FORM * gain)
+    scattered = errors < RIVAL_ERRORS and behind < REPLACES * gain
+    return not beyond_bound and (near or scattered)
 
 
 def to_rule_out(*, behind: float, gain: float) -> float:

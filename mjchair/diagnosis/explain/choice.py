@@ -31,7 +31,7 @@ class Choice:
 
     Attributes:
       hypothesis: effects. fitted: their fit, everything made anew around it.
-      after: the gap that is left with one effect, with two, and so on; the last is the choice's.
+      after: the gap that they leave.
       rivals: for every effect, what could stand in its place, best first.
       own_gains: of every effect, the chi2 that it brings beside the others.
       tried: every fit that was made.
@@ -40,7 +40,7 @@ class Choice:
 
     hypothesis: Hypothesis
     fitted: Fitted
-    after: list[Gap]
+    after: Gap
     rivals: list[list[Rival]]
     own_gains: list[float]
     tried: list[Rival] = field(default_factory=list)

@@ -53,7 +53,7 @@ def chosen(choice: Choice | None) -> Chosen | None:
         return None
     return Chosen(
         name=_name(choice.hypothesis),
-        gap_left=choice.after[-1].exists,
+        gap_left=choice.after.exists,
         rivals=any(choice.rivals),
         sigmas=min(choice.fitted.sigmas.values()),
     )

@@ -63,6 +63,8 @@ class Base:
         mean. dropped: a line for each effect that could not be tried.
       system, reduced: the linear algebra of them all.
       found: effects without which they passed for noise; None: noise hides none.
+      best: the hypothesis of any size that is best by linear algebra, fitted while the noise was
+        sought; None: none brings enough, or this chair cannot have it.
     """
 
     bench: Bench
@@ -75,6 +77,7 @@ class Base:
     system: System
     reduced: Reduced
     found: Found | None = None
+    best: Found | None = None
 
 
 def silent(_: str) -> None:
@@ -145,13 +148,13 @@ def _with_noise_left(base: Base) -> Base:
     then hides what makes it. So where the chair seems to be shaken, the best hypothesis of a chair
     that hardly is stands beside it; it is right where it leaves far less.
     """
-    bench = _noise_left(base, base.bench, base.reduced)
+    bench, best = _noise_left(base, base.bench, base.reduced)
     if noise_shown.loudness(bench) > LOUD:
         hushed = noise_shown.hushed(base.bench)
-        other = _noise_left(base, hushed, _reduced_anew(_on(base, hushed)).reduced)
-        if noise_shown.loudness(other) < QUIETER * noise_shown.loudness(bench):
-            bench = other
-    return with_noise(base, bench)
+        quieter, other = _noise_left(base, hushed, _reduced_anew(_on(base, hushed)).reduced)
+        if noise_shown.loudness(quieter) < QUIETER * noise_shown.loudness(bench):
+            bench, best = quieter, other
+    return replace(with_noise(base, bench), best=best)
 
 
 def with_noise(base: Base, bench: Bench) -> Base:
@@ -165,8 +168,8 @@ def _on(base: Base, bench: Bench) -> Base:
     return replace(base, bench=bench, around=replace(base.around, bench=bench))
 
 
-def _noise_left(base: Base, bench: Bench, reduced: Reduced) -> Bench:
-    """The bench with the noise that the best hypothesis leaves.
+def _noise_left(base: Base, bench: Bench, reduced: Reduced) -> tuple[Bench, Found | None]:
+    """The bench with the noise that the best hypothesis leaves, and its fit where one was made.
 
     Where it gains enough to be added to an answer, it is fitted first: what linear algebra gets
     wrong of an effect would pass for noise, and noise hides how large the effect is.
@@ -177,15 +180,16 @@ def _noise_left(base: Base, bench: Bench, reduced: Reduced) -> Bench:
     best = _best(reduced, base.starts)
     here = base.around.track
     own: dict[ColumnId, Column] = {c: base.columns[c] for c in best.columns} if best else {}
+    found = None
     if best is not None and best.gain > rules.needed(best.free):
         start = replace(base.around.variant, terms=hypotheses.terms(reduced, best))
         try:
             fitted = refit(bench, start, here, base.nuisances)
-            here = fitted.track
+            here, found = fitted.track, Found(best.starts, fitted)
             own = effects_of(base, fitted)
         except (MjchairError, np.linalg.LinAlgError):
             pass  # these effects this chair cannot have: linear algebra must do
-    return noise_shown.left_by(base.bench, here, base.nuisances, own)[0]
+    return noise_shown.left_by(base.bench, here, base.nuisances, own)[0], found
 
 
 def _reduced_anew(base: Base) -> Base:

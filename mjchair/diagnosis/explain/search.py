@@ -31,6 +31,7 @@ from mjchair.errors import MjchairError
 TRIED = 3  # hypotheses of one size, where the first leaves a gap
 LISTED = 6  # hypotheses of one size, until one can be
 REFITTED = 5  # rivals of an effect that is alone
+GROWN = 3  # pairs from which hypotheses of three are grown
 BESIDE = 3  # rivals of each effect that has others beside it
 SHARES = (0.875, 0.75, 0.625, 0.5, 0.375, 0.25, 0.125)  # of linear coefficients, for a new start
 SWAPS = 2  # times that a rival takes the place of the chosen hypothesis
@@ -47,6 +48,9 @@ class Tried(Rival):
         return self.fitted.total + penalty
 
 
+Explained = tuple[Tried, Gap]  # a fit, and the gap that it leaves
+
+
 def choose(base: Base, gap: Gap, say: Say, search: Search | None = None) -> Choice | None:
     """Grow from one effect to as many as the data ask for; None: no effect brings anything.
 
@@ -54,17 +58,16 @@ def choose(base: Base, gap: Gap, say: Say, search: Search | None = None) -> Choi
       search: around the base, with fits that were made already; None: none were.
     """
     search = search or Search(base, say)
-    best, after = search.found() if base.found else _grown(search)
-    if best is None:
+    grown = _grown(search)
+    if grown is None:
         return None
-    best, rivals = search.against_rivals(search.without_needless(best))
+    best, rivals = search.against_rivals(search.without_needless(grown[0]))
     say("the last fit, with everything made anew around it")
     fitted = search.anew(best)
-    after[-1] = gap_after(base, fitted)
     return Choice(
         hypothesis=best.hypothesis,
         fitted=fitted,
-        after=after,
+        after=gap_after(base, fitted),
         rivals=rivals,
         own_gains=[search.own_gain(best, start) for start in best.hypothesis.starts],
         tried=search.tried,
@@ -72,40 +75,29 @@ def choose(base: Base, gap: Gap, say: Say, search: Search | None = None) -> Choi
     )
 
 
-def _grown(search: Search) -> tuple[Tried | None, list[Gap]]:
-    """The best hypothesis, grown effect by effect, and the gap that is left with one, two, ..."""
-    base = search.base
-    options = [hypotheses.singles(base.reduced, base.starts)]
-    if not options[0] or options[0][0].score <= 0.0:
-        return None, []
-    options.append(hypotheses.pairs(base.reduced, base.starts))
-    best: Tried | None = None
-    after: list[Gap] = []
-    for size in range(1, rules.MOST + 1):
-        if size == rules.MOST:
-            bases = [h.starts for h in options[1][:3]]
-            options.append(hypotheses.grown(base.reduced, base.starts, bases))
-        top = None if best is None else search.beside(best)
-        if top is None or top[1].exists:  # perhaps the first effect stands in for two others
-            top = _better(top, search.best_of(options[size - 1], patient=best is None))
-        if top is None:
-            if best is None:
-                continue
-            break  # no second effect stands beside it, so no third does
-        if best is not None and not search.is_worth(best, top[0]):
-            break
-        best, left = top
-        if left.exists:  # a gap is not laid to a further effect before this one is fitted well
-            left = gap_after(base, search.anew(best))
-        after.append(left)
-        if not left.exists:
-            break
-    return best, after
+def _grown(search: Search) -> Explained | None:
+    """The best hypothesis, grown effect by effect, and the gap that it leaves; None: there is none.
+
+    It grows as long as it leaves a gap and a further effect is worth it.
+    """
+    if not search.promises():
+        return None
+    here = search.found()
+    size = len(here[0].hypothesis.starts) if here else 0
+    while size < rules.MOST and (here is None or here[1].exists):
+        size += 1
+        more = search.further(here[0] if here else None, size)
+        if more is None and here is None:
+            continue
+        if more is None or (here is not None and not search.is_worth(here[0], more[0])):
+            break  # where no second effect stands beside the first, no third does
+        here = search.settled(more)
+        if size == 1:
+            here = search.or_left_over(here)
+    return here
 
 
-def _better(
-    one: tuple[Tried, Gap] | None, other: tuple[Tried, Gap] | None
-) -> tuple[Tried, Gap] | None:
+def _better(one: Explained | None, other: Explained | None) -> Explained | None:
     """The one with the lower price; None: there is neither."""
     return min((t for t in (one, other) if t is not None), key=lambda t: t[0].price, default=None)
 
@@ -117,6 +109,7 @@ class Search:
       base: around which. dropped: a line for each hypothesis that this chair cannot have.
       tried: every fit that was made. impossible: starts of those that this chair cannot have.
       again: of some of them, the fit with everything made anew around it.
+      listed: hypotheses by their size, once they were asked for.
       near: the linear algebra that weighs; None: that of the base. latest: the last around a fit.
     """
 
@@ -128,30 +121,83 @@ class Search:
         self.impossible: list[tuple[Start, ...]] = []
         self.again: list[Rival] = []
         self.near = near_fit(base, base.found) if base.found else None
+        self.listed: dict[int, Sequence[Hypothesis]] = {}
         self.latest: NearFit | None = None
 
     def best_single(self) -> Hypothesis | None:
         """The effect with which the search begins; None: none brings anything."""
-        options = hypotheses.singles(self.base.reduced, self.base.starts)
+        options = self.options(1)
         return _commonest(self, options) if options and options[0].score > 0.0 else None
 
-    def found(self) -> tuple[Tried, list[Gap]]:
-        """The effects that were found before the search, and what stands beside them; the gaps."""
+    def promises(self) -> bool:
+        """Whether any effect brings anything, alone or beside those that were found before."""
+        return self.base.found is not None or self.best_single() is not None
+
+    def found(self) -> Explained | None:
+        """The effects that were found before the search, and the gap that they leave."""
         known = self.base.found
-        assert known is not None
+        if known is None:
+            return None
         best = Tried(self.weigh(known.starts), known.fitted)
         self.tried.append(best)
-        after = [gap_after(self.base, best.fitted)]
-        while after[-1].exists and len(best.hypothesis.starts) < rules.MOST:
-            options = _with_one_more(self, best.hypothesis.starts)
-            top = self.best_of(options, patient=False)
-            if top is None or not self.is_worth(best, top[0]):
-                break
-            best = top[0]
-            after.append(top[1])
-        return best, after
+        return best, gap_after(self.base, best.fitted)
 
-    def beside(self, best: Tried) -> tuple[Tried, Gap] | None:
+    def options(self, size: int) -> Sequence[Hypothesis]:
+        """Hypotheses of this many effects around the chair without any, best first."""
+        if size not in self.listed:
+            reduced, starts = self.base.reduced, self.base.starts
+            if size == 1:
+                self.listed[size] = hypotheses.singles(reduced, starts)
+            elif size == 2:
+                self.listed[size] = hypotheses.pairs(reduced, starts)
+            else:
+                best = [h.starts for h in self.options(size - 1)[:GROWN]]
+                self.listed[size] = hypotheses.grown(reduced, starts, best)
+        return self.listed[size]
+
+    def further(self, best: Tried | None, size: int) -> Explained | None:
+        """The best hypothesis of this many effects, and the gap that it leaves; None: none can be.
+
+        Args:
+          best: of one effect less; None: there is none.
+        """
+        if best is not None and self.near is not None:
+            return self.best_of(_with_one_more(self, best.hypothesis.starts), patient=False)
+        top = None if best is None else self.beside(best)
+        if top is not None and not top[1].exists:
+            return top
+        # perhaps the first effect stands in for two others
+        return _better(top, self.best_of(self.options(size), patient=best is None))
+
+    def settled(self, here: Explained) -> Explained:
+        """A fit with the gap that it leaves once everything is made anew around it.
+
+        A gap is not laid to a further effect before this one is fitted well.
+        """
+        best, left = here
+        return best, gap_after(self.base, self.anew(best)) if left.exists else left
+
+    def or_left_over(self, here: Explained) -> Explained:
+        """The single effect, or a better one that was left over while the noise was sought.
+
+        There the best hypothesis of any size is fitted. In it, effects that only made up for a
+        large one being no linear one come to nothing, and the large one is left. By linear algebra
+        another may be the best alone.
+        """
+        known = self.base.best
+        if not here[1].exists or known is None or len(known.starts) == 1:
+            return here
+        left = [s for s in known.starts if known.fitted.sigmas[s.effect.key] > rules.SIGMAS]
+        if len(left) != 1:
+            return here
+        alone = self.weigh(left)
+        self._begin_at(alone, known.fitted)
+        tried = self.fit(alone)
+        if tried is None or tried.price >= here[0].price or not believable(tried.fitted):
+            return here
+        return tried, gap_after(self.base, self.anew(tried))
+
+    def beside(self, best: Tried) -> Explained | None:
         """The best hypothesis with one effect more, by the linear algebra around a fit.
 
         Around a chair without effects, a large effect is wrong by more than a small one brings: a
@@ -196,9 +242,7 @@ class Search:
             return self.near.physical(hypothesis.starts)
         return hypotheses.physical(self.base.reduced, hypothesis)
 
-    def best_of(
-        self, options: Sequence[Hypothesis], patient: bool = True
-    ) -> tuple[Tried, Gap] | None:
+    def best_of(self, options: Sequence[Hypothesis], patient: bool = True) -> Explained | None:
         """The best hypothesis with its fit, and the gap that it leaves; None: none can be.
 
         Where the first leaves a gap, the linear order may be wrong, and the next are fitted too.
@@ -269,15 +313,29 @@ class Search:
                 parameters=parameters,
             ):
                 continue
-            other = self.fit(fewer)
             if fitted.sigmas[start.effect.key] < rules.SIGMAS:
-                other = self._from_more(fewer, fitted, other)
+                self._begin_at(fewer, fitted)
+            other = self.fit(fewer)
             if other is None:
                 continue
             lost = self.anew(other).total - fitted.total
             if rules.can_be_dropped(lost=lost, parameters=parameters):
                 return self.without_needless(other)
         return tried
+
+    def _begin_at(self, fewer: Hypothesis, more: Fitted) -> None:
+        """Make the fit of fewer effects from where more of them ended, if that can be.
+
+        An effect that is hardly there may have helped the fit past the place where it was stuck.
+        """
+        keys = set(fewer.keys)
+        terms = tuple(t for t in more.variant.terms if t.effect.key in keys)
+        fitted = self._made_anew(replace(more.variant, terms=terms), more.track)
+        known = _of(fewer, self.tried)
+        if fitted is not None and (known is None or fitted.total < known.total):
+            found = Tried(fewer, fitted)
+            self.tried.insert(0, found)
+            self.again.insert(0, found)
 
     def own_gain(self, chosen: Tried, start: Start) -> float:
         """Chi2 that one effect of the chosen hypothesis brings beside the others."""
@@ -289,21 +347,6 @@ class Search:
         with self.near_to(chosen):
             own = self.weigh(starts).gain - self.weigh(others).gain
         return float(np.clip(own, 0.0, max(whole, 0.0)))
-
-    def _from_more(self, fewer: Hypothesis, more: Fitted, own: Tried | None) -> Tried | None:
-        """The fit of fewer effects: its own, or a better one that begins where more of them ended.
-
-        An effect that is hardly there may have helped the fit past the place where it was stuck.
-        """
-        keys = set(fewer.keys)
-        terms = tuple(t for t in more.variant.terms if t.effect.key in keys)
-        fitted = self._made_anew(replace(more.variant, terms=terms), more.track)
-        if fitted is None or (own is not None and self.anew(own).total <= fitted.total):
-            return own
-        found = Tried(fewer, fitted)
-        for known in (self.tried, self.again):
-            known.insert(0, found)
-        return found
 
     def against_rivals(self, chosen: Tried) -> tuple[Tried, list[list[Rival]]]:
         """The best of the chosen hypothesis and what could stand in its places, with its rivals.

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ColumnId, ParameterId, RoughlyKnown
-from mjchair.diagnosis.fit.parameter_columns import nuisance_columns, term_columns
+from mjchair.diagnosis.fit.parameter_columns import nuisance_columns, shared_columns, term_columns
 from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.replay.derivatives import Column
@@ -135,6 +135,7 @@ def _around(
     columns = dict(nuisances)
     count = len(columns)
     columns.update(term_columns(bench, here, variant, known))
+    columns.update(shared_columns(variant, columns))
     _check_finite([here.predicted, *columns.values()], variant)
     system = bench.system(here, columns, count, variant)
     step, total = bounded.solve_nuisances(system, bench.windows, _outside(bench, system, count))

@@ -102,3 +102,23 @@ def term_columns(
             edited = derivatives.predictions(simulator, track, model, errors)
             out[key] = [point.factor * (e - y) for e, y in zip(edited, base, strict=True)]
     return {key: out[key] for term in variant.terms for key, _ in term.parameters}
+
+
+def shared_columns(variant: Variant, columns: Mapping[ColumnId, Column]) -> dict[ColumnId, Column]:
+    """Columns of what is roughly known, of parameters that do the same and are free.
+
+    Of one radius that both wheels share, the data cannot tell what is the tires' own and what was
+    only roughly known. Two derivatives that differ by rounding would tell it, and wrongly.
+    """
+    free = {key: p.change for term in variant.terms for key, p in term.parameters}
+    out: dict[ColumnId, Column] = {}
+    for n in variant.nuisances:
+        effect, *names = n.same or ("",)
+        keys = [ParameterId(effect, name) for name in names]
+        if not keys or any(key not in free for key in keys):
+            continue
+        parts = [[(n.std / free[key]) * window for window in columns[key]] for key in keys]
+        out[RoughlyKnown(n.name)] = [
+            np.sum(windows, axis=0) for windows in zip(*parts, strict=True)
+        ]
+    return out
