@@ -28,8 +28,10 @@ from mjchair.simulation.initial import position_joints, start
 
 Array = NDArray[np.float64]
 ROUNDS = 2  # Gauss-Newton rounds a window
-MORE = 4  # further ones of a window whose last step still promised PROMISE, as where casters flip
-PROMISE = 4.0  # of misfit, in variances of the sensors' noise
+MORE = 4  # further ones, as where casters flip
+# of misfit, in variances of the sensors' noise, that the step of a round promises
+PROMISE = 4.0  # from which answers to the slow state are made anew where it led
+CALM = 0.1  # below which it is not taken: the elimination of the state does as much
 
 
 @dataclass
@@ -141,26 +143,27 @@ def track(
             going = search
             # answers that are kept from another chair would lead further rounds astray
             for round_ in range(ROUNDS if kept else ROUNDS + MORE):
-                if round_ >= ROUNDS:
-                    going = {i: s for i, s in search.items() if _promising(chair, s)}
+                going = {i: s for i, s in going.items() if _goes_on(chair, s, round_, kept)}
                 if not going:
                     break
                 _fit_round(
                     simulator, chair, (model, coarse), errors, going, white, predicted, slow, kept
                 )
-            outcomes = _traced(simulator, model, [(i, search[i].state) for i in members])
+            moved = [i for i in members if search[i].seen is None]
+            outcomes = _traced(simulator, model, [(i, search[i].state) for i in moved])
             for i, outcome in outcomes.items():
                 w = simulator.windows[i]
                 predicted[i] = errors.applied(simulator, w, outcome.predicted)
                 search[i].judge(_size(simulator, w, predicted[i], white))
-            worse = [i for i in members if search[i].state is not search[i].best]
+            worse = [i for i in moved if search[i].state is not search[i].best]
             again = _traced(simulator, model, [(i, search[i].best) for i in worse])
             for i in members:
-                outcome = again.get(i, outcomes[i])
-                predicted[i] = errors.applied(simulator, simulator.windows[i], outcome.predicted)
-                states[i], traces[i] = search[i].best, outcome.trace
+                last = again.get(i) or outcomes.get(i) or search[i].seen
+                assert last is not None
+                predicted[i] = errors.applied(simulator, simulator.windows[i], last.predicted)
+                states[i], traces[i] = search[i].best, last.trace
                 if before is None:
-                    _hand_over(simulator, model, i, outcome.trace, states)
+                    _hand_over(simulator, model, i, last.trace, states)
     return Track(states, predicted, slow, traces)
 
 
@@ -177,13 +180,15 @@ class Search:
     Attributes:
       state: that was tried last. best, size: the best so far, and its misfit. change: from the
         best to the one that was tried. promise: by how much that lessens the misfit, if linear.
+      seen: what the state shows, once no step from it is worth it; None: a step was taken.
     """
 
     state: State
     best: State
     size: float = np.inf
     change: Array = field(default_factory=lambda: np.zeros(len(SLOW)))
-    promise: float = 0.0
+    promise: float = np.inf
+    seen: Outcome | None = None
 
     def judge(self, size: float) -> bool:
         """Take the misfit of the state; False where it is worse than the best."""
@@ -193,9 +198,13 @@ class Search:
         return True
 
 
-def _promising(chair: Chair, search: Search) -> bool:
-    """Whether a further round is worth it; a chair at rest answers in steps, not in slopes."""
-    return search.promise > PROMISE and not chair.stands(search.state)
+def _goes_on(chair: Chair, search: Search, round_: int, kept: bool) -> bool:
+    """Whether a window takes part in a round; a chair at rest answers in steps, not in slopes."""
+    if search.seen is not None:
+        return False
+    if kept or chair.stands(search.state):
+        return round_ < ROUNDS
+    return search.promise > PROMISE
 
 
 def _traced(
@@ -226,34 +235,52 @@ def _fit_round(
     kept: bool,
 ) -> None:
     """One Gauss-Newton step of the slow states; `kept`: their columns are known."""
-    jobs = []
+    fine, coarse = models
+    outcomes = _traced(simulator, fine, [(i, s.state) for i, s in search.items()])
+    good = []
     for i, s in search.items():
-        w = simulator.windows[i]
-        jobs.append(Job(models[0], w, s.state))
-        if kept:
-            continue
-        jobs.append(Job(models[1], w, s.state))
-        jobs += [
-            Job(models[1], w, chair.moved(s.state, STEPS[k] * np.eye(len(SLOW))[k]))
-            for k in range(len(SLOW))
-        ]
-    outcomes = simulator.run(jobs)
-    each = 1 if kept else 2 + len(SLOW)
-    for n, (i, s) in enumerate(search.items()):
-        w = simulator.windows[i]
-        seen = [
-            errors.applied(simulator, w, o.predicted) for o in outcomes[n * each : n * each + each]
-        ]
-        if not s.judge(_size(simulator, w, seen[0], white)):
+        seen = errors.applied(simulator, simulator.windows[i], outcomes[i].predicted)
+        if not s.judge(_size(simulator, simulator.windows[i], seen, white)):
             s.change, s.promise = 0.3 * s.change, 0.3 * s.promise  # a step too far
             s.state = chair.moved(s.best, s.change)
             continue
-        predicted[i] = seen[0]
-        if not kept:
-            slow[i] = np.stack([y - seen[1] for y in seen[2:]], axis=2)
-        change, s.promise = _step(simulator, i, s.state, seen[0], slow[i], white)
+        predicted[i] = seen
+        good.append(i)
+    if not kept:
+        slow_of = _answers(simulator, chair, coarse, errors, {i: search[i].state for i in good})
+        for i in good:
+            slow[i] = slow_of[i]
+    for i in good:
+        s = search[i]
+        change, s.promise = _step(simulator, i, s.state, predicted[i], slow[i], white)
+        if s.promise <= CALM and not chair.stands(s.state):
+            s.seen = outcomes[i]
+            continue
         s.change = change * STEPS
         s.state = chair.moved(s.state, s.change)
+
+
+def _answers(
+    simulator: WindowSimulator,
+    chair: Chair,
+    model: mujoco.MjModel,
+    errors: SensorErrors,
+    states: dict[int, State],
+) -> dict[int, Array]:
+    """How windows answer to their slow states: (rows, channels, 7) each, times chair.STEPS."""
+    jobs = []
+    for i, state in states.items():
+        moved = [chair.moved(state, step) for step in np.diag(STEPS)]
+        jobs += [Job(model, simulator.windows[i], s) for s in (state, *moved)]
+    outcomes = iter(simulator.run(jobs))
+    out = {}
+    for i in states:
+        w = simulator.windows[i]
+        base, *seen = (
+            errors.applied(simulator, w, next(outcomes).predicted) for _ in range(1 + len(SLOW))
+        )
+        out[i] = np.stack([y - base for y in seen], axis=2)
+    return out
 
 
 def _step(
@@ -267,8 +294,11 @@ def _step(
     b = (miss / white)[there]
     spread = np.r_[prior(simulator, i, state) / STEPS, np.full(columns.shape[2] - len(SLOW), 1e4)]
     normal = a.T @ a + np.diag(1.0 / spread**2)
-    whole = np.linalg.solve(normal, a.T @ b)
-    change, promise = whole[: len(SLOW)], float(whole @ (a.T @ b))
+    aim, zeros = a.T @ b, slice(len(SLOW), None)
+    whole = np.linalg.solve(normal, aim)
+    # the zeros of wheels' angles are free wherever the state is
+    without = aim[zeros] @ np.linalg.solve(normal[zeros, zeros], aim[zeros])
+    change, promise = whole[: len(SLOW)], float(whole @ aim - without)
     # shortened, never turned
     return np.asarray(change * min(1.0, 20.0 / max(np.abs(change).max(), 1e-9))), promise
 
