@@ -37,16 +37,17 @@ def test_a_drag_is_no_rounding_where_channels_are_precise_and_the_chair_is_shake
     assert taken_whole(left, raw).tolist() == [False, True]
 
 
-@pytest.mark.parametrize(
-    "nuisance", [n for n in roughly_known.MECHANICAL if n.same], ids=lambda n: n.name
-)
-def test_what_is_roughly_known_moves_the_chair_as_the_effect_does_that_is_the_same(nuisance):
-    name, *parameters = nuisance.same
-    by = 0.5 * nuisance.std
+SHARED = [(e, *pair) for e in library.MECHANICAL for pair in e.shared.items()]
+
+
+@pytest.mark.parametrize(("effect", "nuisance", "parameters"), SHARED, ids=lambda v: str(v)[:16])
+def test_what_an_effect_shares_with_the_roughly_known_is_the_same(effect, nuisance, parameters):
+    known = next(n for n in roughly_known.MECHANICAL if n.name == nuisance)
+    by = 0.5 * known.std
     one, other = mjchair.load_spec("manual"), mjchair.load_spec("manual")
-    nuisance.edit(one, by)
-    library.find(name).apply(other, dict.fromkeys(parameters, by))
-    assert one.to_xml() == other.to_xml()
+    known.edit(one, by)
+    effect.apply(other, dict.fromkeys(parameters, by))
+    assert one.to_xml() == other.to_xml() != mjchair.load_spec("manual").to_xml()
 
 
 def test_data_do_not_tell_a_wheel_from_what_is_roughly_known_of_both():

@@ -24,4 +24,5 @@ EFFECT = Effect(
     signature="slope of Fy over alpha",
     source="Dressel 2013: 0.15 to 0.35 of the load per degree, for 14 tires",
     edit=edit,
+    shared={"caster_stiffness": ("front",), "rear_stiffness": ("rear",)},
 )

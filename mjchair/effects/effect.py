@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
@@ -143,6 +143,8 @@ class Effect:
       example: values to practise with; None: typical ones.
       most, least: parameter -> upper and lower bound that follow from the chair in hand; None:
         those of the parameters hold on any.
+      shared: what is only roughly known of any chair, and the parameters that move the same where
+        all of them move as far: of the sum, the data say nothing.
       remark: what values and their standard errors say in one sentence, for a verdict that names
         the effect; None: their names and units say it.
     """
@@ -168,6 +170,7 @@ class Effect:
     example: Values | None = None
     most: Callable[[mujoco.MjSpec], Values] | None = None
     least: Callable[[mujoco.MjSpec], Values] | None = None
+    shared: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     remark: Callable[[Mapping[str, float], Mapping[str, float]], str] | None = None
 
     @property

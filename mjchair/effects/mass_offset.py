@@ -24,4 +24,5 @@ EFFECT = Effect(
     signature="load shift: yaw with longitudinal acceleration (y), understeer (x)",
     source="a seated person leans a few centimetres",
     edit=edit,
+    shared={"centre_x": ("x",), "centre_y": ("y",)},
 )

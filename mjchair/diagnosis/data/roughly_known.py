@@ -32,7 +32,6 @@ class Nuisance:
       channel, error: of a sensor, and what it does.
       linear: whether its answer is added to predictions, and no chair is made with it. No time step
         simulates the tires that do not give way at all, which a chair nearly may have.
-      same: effect and its parameters that do the same to the chair where all move as far.
     """
 
     name: str
@@ -42,7 +41,6 @@ class Nuisance:
     channel: str = ""
     error: SensorError = SensorError.BIAS
     linear: bool = False
-    same: tuple[str, ...] = ()
 
 
 def _mass(spec: mujoco.MjSpec, value: float) -> None:
@@ -120,24 +118,14 @@ MECHANICAL = (
     Nuisance("mass", 0.05, "1", _mass),
     Nuisance("inertia", 0.10, "1", _inertia),
     Nuisance("wheel_inertia", 0.05, "1", _wheel_inertia),
-    Nuisance("centre_x", 0.01, "m", _centre(0), same=("mass_offset", "x")),
-    Nuisance("centre_y", 0.002, "m", _centre(1), same=("mass_offset", "y")),
+    Nuisance("centre_x", 0.01, "m", _centre(0)),
+    Nuisance("centre_y", 0.002, "m", _centre(1)),
     Nuisance("centre_z", 0.03, "m", _centre(2)),
-    Nuisance(
-        "rear_stiffness", 0.07, "1", _stiffness(parts.REAR), same=("cornering_stiffness", "rear")
-    ),
-    Nuisance(
-        "caster_stiffness",
-        0.07,
-        "1",
-        _stiffness(parts.CASTERS),
-        same=("cornering_stiffness", "front"),
-    ),
+    Nuisance("rear_stiffness", 0.07, "1", _stiffness(parts.REAR)),
+    Nuisance("caster_stiffness", 0.07, "1", _stiffness(parts.CASTERS)),
     Nuisance("rocking", COMPLIANCE, "1", _rocking, linear=True),
     Nuisance("slip", COMPLIANCE, "1", _slip, linear=True),
-    Nuisance(
-        "rolling_radius", 0.0015, "m", _rolling_radius, same=("wheel_radius", "left", "right")
-    ),
+    Nuisance("rolling_radius", 0.0015, "m", _rolling_radius),
 )
 # of torques that were measured: gains of uncalibrated sensors are within 10 %, assumed. Mass, gain
 # and the mass that moves on the chair grow alike without a trace: 10 % of gain are 10 % of each

@@ -110,15 +110,15 @@ def shared_columns(variant: Variant, columns: Mapping[ColumnId, Column]) -> dict
     Of one radius that both wheels share, the data cannot tell what is the tires' own and what was
     only roughly known. Two derivatives that differ by rounding would tell it, and wrongly.
     """
-    free = {key: p.change for term in variant.terms for key, p in term.parameters}
+    stds = {n.name: n.std for n in variant.nuisances}
     out: dict[ColumnId, Column] = {}
-    for n in variant.nuisances:
-        effect, *names = n.same or ("",)
-        keys = [ParameterId(effect, name) for name in names]
-        if not keys or any(key not in free for key in keys):
-            continue
-        parts = [[(n.std / free[key]) * window for window in columns[key]] for key in keys]
-        out[RoughlyKnown(n.name)] = [
-            np.sum(windows, axis=0) for windows in zip(*parts, strict=True)
-        ]
+    for term in variant.terms:
+        change = {p.name: p.change for _, p in term.parameters}
+        for nuisance, names in term.effect.shared.items():
+            if set(names) <= set(change) and nuisance in stds:
+                parts = [
+                    [(stds[nuisance] / change[name]) * window for window in columns[key]]
+                    for name, key in ((n, ParameterId(term.effect.key, n)) for n in names)
+                ]
+                out[RoughlyKnown(nuisance)] = [np.sum(w, axis=0) for w in zip(*parts, strict=True)]
     return out
