@@ -18,7 +18,7 @@ def taken(monkeypatch, first, other):
 
     def noise_left(base, bench, reduced):
         looked.append(bench)
-        return SimpleNamespace(power=other if bench == "hushed" else first)
+        return SimpleNamespace(power=other if bench == "hushed" else first), None
 
     monkeypatch.setattr(screening, "_noise_left", noise_left)
     monkeypatch.setattr(screening, "_reduced_anew", lambda base: base)
