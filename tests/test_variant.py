@@ -42,7 +42,8 @@ SHARED = [(e, *pair) for e in library.MECHANICAL for pair in e.shared.items()]
 
 @pytest.mark.parametrize(("effect", "nuisance", "parameters"), SHARED, ids=lambda v: str(v)[:16])
 def test_what_an_effect_shares_with_the_roughly_known_is_the_same(effect, nuisance, parameters):
-    known = next(n for n in roughly_known.MECHANICAL if n.name == nuisance)
+    every = (*roughly_known.MECHANICAL, roughly_known.TORQUE)
+    known = next(n for n in every if n.name == nuisance)
     by = 0.5 * known.std
     one, other = mjchair.load_spec("manual"), mjchair.load_spec("manual")
     known.edit(one, by)

@@ -28,4 +28,5 @@ EFFECT = Effect(
     edit=edit,
     driven=True,
     drive=False,
+    shared={"torque": ("left", "right")},
 )
