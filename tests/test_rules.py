@@ -256,6 +256,15 @@ def test_two_starts_that_end_apart_are_told():
     assert rules.starts_disagree(100.0, 101.0 + rules.WORTH)
 
 
+def test_an_effect_without_promise_is_not_fitted():
+    enough = rules.HOPELESS * rules.needed(2)
+    assert rules.may_be_worth_adding(promised=enough, parameters=2, gain=100.0)
+    assert not rules.may_be_worth_adding(promised=0.99 * enough, parameters=2, gain=100.0)
+    # forms that are a little wrong leave more than this beside a chi2 of 90 000
+    assert not rules.may_be_worth_adding(promised=enough, parameters=2, gain=90_000.0)
+    assert rules.worth_adding(gained=180.0, parameters=2, held=20.0, gain=90_000.0)
+
+
 def test_an_effect_is_dropped_where_the_others_lose_little():
     enough = rules.needed(1)
     assert rules.can_be_dropped(lost=enough - 0.1, parameters=1)

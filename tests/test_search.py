@@ -184,7 +184,7 @@ def test_a_second_effect_is_weighed_around_the_fit_of_the_first(fits, monkeypatc
         }
     )
     both = fit(1110.0, "rolling", "motor")
-    near = SimpleNamespace(refit=lambda starts, rounds: both)
+    near = SimpleNamespace(refit=lambda starts, rounds: both, weigh=lambda starts: ONE)
     monkeypatch.setattr(search, "near_fit", lambda base, found: near)
     monkeypatch.setattr(search.hypotheses, "singles", lambda *_: [ONE])
     monkeypatch.setattr(search.hypotheses, "pairs", lambda *_: [])
@@ -271,7 +271,8 @@ def test_where_no_second_effect_stands_no_third_is_tried(fits, monkeypatch):
     monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
     monkeypatch.setattr(search, "believable", lambda f: len(f.variant.terms) == 1)
     monkeypatch.setattr(search, "_replacements", lambda *_: [])
-    monkeypatch.setattr(search, "near_fit", lambda *_: None)
+    near = SimpleNamespace(weigh=lambda starts: ONE)
+    monkeypatch.setattr(search, "near_fit", lambda *_: near)
     monkeypatch.setattr(search, "_with_one_more", lambda *_: [])
     base = searching().base
     base.starts = ()

@@ -40,6 +40,9 @@ TIE = 6.0  # chi2 within which hypotheses fit alike
 # of the gain of all: what forms that are 4.5 % wrong leave, so less is no further effect
 # (assumption; the rocking on its tires of a chair that is a little stiffer leaves as much)
 LEFT_BY_FORM = 0.002
+# of what a further effect must bring: where linear algebra around the fit promises less, none is
+# fitted (assumption; a fit may bring more than was promised, where a place or a time is found)
+HOPELESS = 0.3
 SURE = 6.0  # standard errors beyond which an effect is not tried without
 SHORT = 0.1  # share of the promise of the linear fit: a fit that misses more starts again elsewhere
 # the gap
@@ -263,6 +266,15 @@ def worth_adding(*, gained: float, parameters: int, held: float, gain: float) ->
     """
     enough = gained >= needed(parameters) and beyond_form(own=gained, gain=gain)
     return enough and held >= HELD
+
+
+def may_be_worth_adding(*, promised: float, parameters: int, gain: float) -> bool:
+    """Whether a larger hypothesis is fitted at all, by what linear algebra around a fit promises.
+
+    Args:
+      promised: chi2 that it brings more. parameters: that it has more. gain: that all bring.
+    """
+    return promised >= HOPELESS * max(needed(parameters), LEFT_BY_FORM * gain)
 
 
 def worth_trying(*, score: float, best: float, gain: float) -> bool:

@@ -162,7 +162,7 @@ class Search:
           best: of one effect less; None: there is none.
         """
         if best is not None and self.near is not None:
-            return self.best_of(_with_one_more(self, best.hypothesis.starts), patient=False)
+            return self.best_of(self._promising(best), patient=False)
         top = None if best is None else self.beside(best)
         if top is not None and not top[1].exists:
             return top
@@ -207,7 +207,20 @@ class Search:
           best: whose effects stay; everything is made anew around it.
         """
         with self.near_to(best):
-            return self.best_of(_with_one_more(self, best.hypothesis.starts), patient=False)
+            return self.best_of(self._promising(best), patient=False)
+
+    def _promising(self, best: Tried) -> list[Hypothesis]:
+        """Hypotheses of one effect more that may be worth it by the linear algebra around a fit."""
+        here = self.weigh(best.hypothesis.starts)
+        return [
+            more
+            for more in _with_one_more(self, best.hypothesis.starts)
+            if rules.may_be_worth_adding(
+                promised=more.gain - here.gain,
+                parameters=more.free - here.free,
+                gain=more.gain,
+            )
+        ]
 
     @contextmanager
     def near_to(self, tried: Tried | None) -> Iterator[None]:
