@@ -1,15 +1,18 @@
 """The columns of a fit: by how little a parameter is moved for one, and which are rounding."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import mjchair
 from mjchair.diagnosis.data import roughly_known
+from mjchair.diagnosis.fit import nonlinear
 from mjchair.diagnosis.fit.column_ids import ParameterId, RoughlyKnown
 from mjchair.diagnosis.fit.parameter_columns import shared_columns
 from mjchair.diagnosis.fit.system import taken_whole
 from mjchair.diagnosis.fit.variant import LEAST, NUDGE, Term, Variant, nudged
-from mjchair.effects import library, wheel_radius
+from mjchair.effects import library, mass_offset, wheel_radius
 
 LEFT = wheel_radius.EFFECT.parameter("left")  # 3 mm is worth finding, 50 mm the bound
 
@@ -64,3 +67,25 @@ def test_data_do_not_tell_a_wheel_from_what_is_roughly_known_of_both():
     assert list(made) == [RoughlyKnown("rolling_radius")]
     assert made[RoughlyKnown("rolling_radius")][0] == pytest.approx(0.5 * (4.0 - 2.0))
     assert not shared_columns(Variant(known, terms=(one,)), columns)
+
+
+def test_a_fit_takes_the_columns_that_an_effect_shares(monkeypatch):
+    """Not those that were made before it, which differ by rounding."""
+    term = Term(mass_offset.EFFECT, {"x": 0.01, "y": 0.0}, ("x",))
+    known = roughly_known.nuisances((), {})
+    before = {RoughlyKnown(n.name): [np.ones((3, 1))] for n in known}
+    answer = {ParameterId("mass_offset", "x"): [np.full((3, 1), 6.0)]}
+    monkeypatch.setattr(nonlinear, "track", lambda *_: SimpleNamespace(predicted=[np.zeros(3)]))
+    monkeypatch.setattr(nonlinear, "term_columns", lambda *_: answer)
+    asked = {}
+
+    def system(here, columns, count, variant):
+        asked.update(columns)
+        raise InterruptedError
+
+    simulator = SimpleNamespace(channels=("heading",), compile=lambda _: None)
+    bench = SimpleNamespace(simulator=simulator, noise={}, system=system)
+    with pytest.raises(InterruptedError):
+        nonlinear._around(bench, Variant(known, terms=(term,)), None, before)
+    assert asked[RoughlyKnown("centre_x")][0] == pytest.approx(6.0 * 0.01 / 0.03)
+    assert asked[RoughlyKnown("centre_y")][0] == pytest.approx(1.0)
