@@ -1,0 +1,66 @@
+"""How far the slow state of a window is fitted, on numbers alone: nothing is simulated."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mjchair.diagnosis.replay import window_states
+from mjchair.diagnosis.replay.chair_state import SLOW, STEPS
+
+CHANNELS = ("left_wheel_angle", "imu_gyro.z")
+WHITE = np.array([0.01, 0.02])
+SLOPE = np.linspace(0.0, 1.0, 50)
+
+
+@pytest.fixture
+def step(monkeypatch):
+    """A step of a state of which one part turns the chair, for a residual (rows, channels)."""
+    monkeypatch.setattr(window_states, "prior", lambda *_: np.ones(len(SLOW)))
+    monkeypatch.setattr(window_states, "residual", lambda measured, seen, _: measured - seen)
+    slow = np.zeros((50, 2, len(SLOW)))
+    slow[:, 1, 4] = SLOPE
+
+    def promised(miss):
+        simulator = SimpleNamespace(
+            channels=CHANNELS, windows=[None], measured=lambda _: miss, chair=None
+        )
+        return window_states._step(simulator, 0, None, np.zeros((50, 2)), slow, WHITE)
+
+    return promised
+
+
+def test_the_zero_of_a_wheel_promises_nothing_of_the_state(step):
+    """It is free wherever the state is; counted, it kept windows going for six rounds."""
+    miss = np.zeros((50, 2))
+    miss[:, 0] = 0.3
+    change, promise = step(miss)
+    assert abs(promise) < 1e-6 and np.abs(change).max() < 1e-6
+
+
+def test_a_step_promises_what_it_explains(step):
+    miss = np.zeros((50, 2))
+    miss[:, 0], miss[:, 1] = 0.3, 0.1 * SLOPE
+    change, promise = step(miss)
+    curvature = (SLOPE @ SLOPE) / WHITE[1] ** 2
+    shrunk = curvature / (curvature + STEPS[4] ** 2)  # by its prior
+    assert change[4] == pytest.approx(0.1 * shrunk)
+    assert promise == pytest.approx(0.01 * curvature * shrunk)
+
+
+@pytest.mark.parametrize(
+    ("promise", "stands", "kept", "rounds"),
+    [
+        (window_states.PROMISE, False, False, 0),  # what it promises, the elimination does
+        (5.0, False, False, 9),
+        (5.0, True, False, window_states.ROUNDS),  # at rest a chair answers in steps
+        (5.0, False, True, window_states.ROUNDS),  # answers of another chair lead astray
+    ],
+)
+def test_how_long_a_window_goes_on(promise, stands, kept, rounds):
+    chair = SimpleNamespace(stands=lambda _: stands)
+    search = window_states.Search(None, None, promise=promise)
+    going = [window_states._goes_on(chair, search, k, kept) for k in range(9)]
+    assert going == [True] * rounds + [False] * (9 - rounds)
+    search.seen = "what its state shows"
+    assert not window_states._goes_on(chair, search, 0, kept)
