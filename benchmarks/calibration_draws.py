@@ -446,6 +446,7 @@ def base_of(bed: Bed, y: Sequence[Array]) -> Any:
         system=system,
         starts=bed.kept.starts,
         found=None,
+        best=None,
     )
 
 

@@ -90,7 +90,7 @@ def chosen(known, name, rivals=(), gap_left=False):
     return SimpleNamespace(
         **vars(fits[name]),
         tried=list(fits.values()),
-        after=[SimpleNamespace(exists=gap_left)],
+        after=SimpleNamespace(exists=gap_left),
         rivals=[[fits[r] for r in rivals]],
     )
 
