@@ -48,7 +48,7 @@ class Tried(Rival):
         return self.fitted.total + penalty
 
 
-Explained = tuple[Tried, Gap]  # a fit, and the gap that it leaves
+WithGap = tuple[Tried, Gap]  # a fit, and the gap that it leaves
 
 
 def choose(base: Base, gap: Gap, say: Say, search: Search | None = None) -> Choice | None:
@@ -75,7 +75,7 @@ def choose(base: Base, gap: Gap, say: Say, search: Search | None = None) -> Choi
     )
 
 
-def _grown(search: Search) -> Explained | None:
+def _grown(search: Search) -> WithGap | None:
     """The best hypothesis, grown effect by effect, and the gap that it leaves; None: there is none.
 
     It grows as long as it leaves a gap and a further effect is worth it.
@@ -97,7 +97,7 @@ def _grown(search: Search) -> Explained | None:
     return here
 
 
-def _better(one: Explained | None, other: Explained | None) -> Explained | None:
+def _better(one: WithGap | None, other: WithGap | None) -> WithGap | None:
     """The one with the lower price; None: there is neither."""
     return min((t for t in (one, other) if t is not None), key=lambda t: t[0].price, default=None)
 
@@ -133,7 +133,7 @@ class Search:
         """Whether any effect brings anything, alone or beside those that were found before."""
         return self.base.found is not None or self.best_single() is not None
 
-    def found(self) -> Explained | None:
+    def found(self) -> WithGap | None:
         """The effects that were found before the search, and the gap that they leave."""
         known = self.base.found
         if known is None:
@@ -155,7 +155,7 @@ class Search:
                 self.listed[size] = hypotheses.grown(reduced, starts, best)
         return self.listed[size]
 
-    def further(self, best: Tried | None, size: int) -> Explained | None:
+    def further(self, best: Tried | None, size: int) -> WithGap | None:
         """The best hypothesis of this many effects, and the gap that it leaves; None: none can be.
 
         Args:
@@ -169,7 +169,7 @@ class Search:
         # perhaps the first effect stands in for two others
         return _better(top, self.best_of(self.options(size), patient=best is None))
 
-    def settled(self, here: Explained) -> Explained:
+    def settled(self, here: WithGap) -> WithGap:
         """A fit with the gap that it leaves once everything is made anew around it.
 
         A gap is not laid to a further effect before this one is fitted well.
@@ -177,7 +177,7 @@ class Search:
         best, left = here
         return best, gap_after(self.base, self.anew(best)) if left.exists else left
 
-    def or_left_over(self, here: Explained) -> Explained:
+    def or_left_over(self, here: WithGap) -> WithGap:
         """The single effect, or a better one that was left over while the noise was sought.
 
         There the best hypothesis of any size is fitted. In it, effects that only made up for a
@@ -197,7 +197,7 @@ class Search:
             return here
         return tried, gap_after(self.base, self.anew(tried))
 
-    def beside(self, best: Tried) -> Explained | None:
+    def beside(self, best: Tried) -> WithGap | None:
         """The best hypothesis with one effect more, by the linear algebra around a fit.
 
         Around a chair without effects, a large effect is wrong by more than a small one brings: a
@@ -255,7 +255,7 @@ class Search:
             return self.near.physical(hypothesis.starts)
         return hypotheses.physical(self.base.reduced, hypothesis)
 
-    def best_of(self, options: Sequence[Hypothesis], patient: bool = True) -> Explained | None:
+    def best_of(self, options: Sequence[Hypothesis], patient: bool = True) -> WithGap | None:
         """The best hypothesis with its fit, and the gap that it leaves; None: none can be.
 
         Where the first leaves a gap, the linear order may be wrong, and the next are fitted too.
