@@ -62,5 +62,5 @@ def test_how_long_a_window_goes_on(promise, stands, kept, rounds):
     search = window_states.Search(None, None, promise=promise)
     going = [window_states._goes_on(chair, search, k, kept) for k in range(9)]
     assert going == [True] * rounds + [False] * (9 - rounds)
-    search.seen = "what its state shows"
+    search.calm = True
     assert not window_states._goes_on(chair, search, 0, kept)

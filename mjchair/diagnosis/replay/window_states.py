@@ -146,24 +146,16 @@ def track(
                 going = {i: s for i, s in going.items() if _goes_on(chair, s, round_, kept)}
                 if not going:
                     break
-                _fit_round(
-                    simulator, chair, (model, coarse), errors, going, white, predicted, slow, kept
-                )
-            moved = [i for i in members if search[i].seen is None]
-            outcomes = _traced(simulator, model, [(i, search[i].state) for i in moved])
-            for i, outcome in outcomes.items():
+                _fit_round(simulator, chair, (model, coarse), errors, going, white, slow, kept)
+            moved = {i: s.state for i, s in search.items() if not s.calm}
+            for i, outcome in _traced(simulator, model, moved).items():
                 w = simulator.windows[i]
-                predicted[i] = errors.applied(simulator, w, outcome.predicted)
-                search[i].judge(_size(simulator, w, predicted[i], white))
-            worse = [i for i in moved if search[i].state is not search[i].best]
-            again = _traced(simulator, model, [(i, search[i].best) for i in worse])
-            for i in members:
-                last = again.get(i) or outcomes.get(i) or search[i].seen
-                assert last is not None
-                predicted[i] = errors.applied(simulator, simulator.windows[i], last.predicted)
-                states[i], traces[i] = search[i].best, last.trace
+                shown = errors.applied(simulator, w, outcome.predicted)
+                search[i].judge(_size(simulator, w, shown, white), shown, outcome.trace)
+            for i, s in search.items():
+                states[i], predicted[i], traces[i] = s.best, s.predicted, s.trace
                 if before is None:
-                    _hand_over(simulator, model, i, last.trace, states)
+                    _hand_over(simulator, model, i, s.trace, states)
     return Track(states, predicted, slow, traces)
 
 
@@ -178,9 +170,9 @@ class Search:
     """The state of one window while it is fitted.
 
     Attributes:
-      state: that was tried last. best, size: the best so far, and its misfit. change: from the
-        best to the one that was tried. promise: by how much that lessens the misfit, if linear.
-      seen: what the state shows, once no step from it is worth it; None: a step was taken.
+      state: that was tried last. best, size: the best so far, and its misfit. predicted, trace: of
+        the best. change: from the best to the one that was tried. promise: by how much that
+        lessens the misfit, if linear. calm: whether no step from the best is worth it.
     """
 
     state: State
@@ -188,19 +180,22 @@ class Search:
     size: float = np.inf
     change: Array = field(default_factory=lambda: np.zeros(len(SLOW)))
     promise: float = np.inf
-    seen: Outcome | None = None
+    calm: bool = False
+    predicted: Array = field(default_factory=lambda: np.empty(0))
+    trace: dict[str, Array] = field(default_factory=dict)
 
-    def judge(self, size: float) -> bool:
-        """Take the misfit of the state; False where it is worse than the best."""
+    def judge(self, size: float, predicted: Array, trace: dict[str, Array]) -> bool:
+        """Take what the state shows, and its misfit; False where it is worse than the best."""
         if size > 1.001 * self.size:
             return False
         self.best, self.size = self.state, size
+        self.predicted, self.trace = predicted, trace
         return True
 
 
 def _goes_on(chair: Chair, search: Search, round_: int, kept: bool) -> bool:
     """Whether a window takes part in a round; a chair at rest answers in steps, not in slopes."""
-    if search.seen is not None:
+    if search.calm:
         return False
     if kept or chair.stands(search.state):
         return round_ < ROUNDS
@@ -208,11 +203,11 @@ def _goes_on(chair: Chair, search: Search, round_: int, kept: bool) -> bool:
 
 
 def _traced(
-    simulator: WindowSimulator, model: mujoco.MjModel, which: list[tuple[int, State]]
+    simulator: WindowSimulator, model: mujoco.MjModel, states: dict[int, State]
 ) -> dict[int, Outcome]:
-    jobs = [Job(model, simulator.windows[i], state) for i, state in which]
+    jobs = [Job(model, simulator.windows[i], state) for i, state in states.items()]
     done = simulator.run(jobs, trace=True) if jobs else []
-    return {i: outcome for (i, _), outcome in zip(which, done, strict=True)}
+    return dict(zip(states, done, strict=True))
 
 
 def _size(simulator: WindowSimulator, window: Window, seen: Array, white: Array) -> float:
@@ -230,31 +225,28 @@ def _fit_round(
     errors: SensorErrors,
     search: dict[int, Search],
     white: Array,
-    predicted: list[Array],
     slow: list[Array],
     kept: bool,
 ) -> None:
     """One Gauss-Newton step of the slow states; `kept`: their columns are known."""
     fine, coarse = models
-    outcomes = _traced(simulator, fine, [(i, s.state) for i, s in search.items()])
-    good = []
-    for i, s in search.items():
-        seen = errors.applied(simulator, simulator.windows[i], outcomes[i].predicted)
-        if not s.judge(_size(simulator, simulator.windows[i], seen, white)):
-            s.change, s.promise = 0.3 * s.change, 0.3 * s.promise  # a step too far
-            s.state = chair.moved(s.best, s.change)
+    good: dict[int, State] = {}
+    for i, outcome in _traced(simulator, fine, {i: s.state for i, s in search.items()}).items():
+        s, w = search[i], simulator.windows[i]
+        shown = errors.applied(simulator, w, outcome.predicted)
+        if s.judge(_size(simulator, w, shown, white), shown, outcome.trace):
+            good[i] = s.state
             continue
-        predicted[i] = seen
-        good.append(i)
+        s.change, s.promise = 0.3 * s.change, 0.3 * s.promise  # a step too far
+        s.state = chair.moved(s.best, s.change)
     if not kept:
-        slow_of = _answers(simulator, chair, coarse, errors, {i: search[i].state for i in good})
-        for i in good:
-            slow[i] = slow_of[i]
+        for i, answers in _answers(simulator, chair, coarse, errors, good).items():
+            slow[i] = answers
     for i in good:
         s = search[i]
-        change, s.promise = _step(simulator, i, s.state, predicted[i], slow[i], white)
-        if s.promise <= CALM and not chair.stands(s.state):
-            s.seen = outcomes[i]
+        change, s.promise = _step(simulator, i, s.state, s.predicted, slow[i], white)
+        s.calm = s.promise <= CALM and not chair.stands(s.state)
+        if s.calm:
             continue
         s.change = change * STEPS
         s.state = chair.moved(s.state, s.change)
