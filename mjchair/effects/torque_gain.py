@@ -5,16 +5,13 @@ from __future__ import annotations
 import mujoco
 
 from mjchair.effects.effect import Effect, Parameter
-from mjchair.model import parts
+from mjchair.model import edits, parts
 
 
 def edit(spec: mujoco.MjSpec, left: float, right: float) -> None:
     """Change the torque of the rear wheels' actuators by these fractions (1)."""
     for wheel, change in zip(parts.REAR, (left, right), strict=True):
-        actuator = parts.named(spec.actuators, wheel, "actuator")
-        gain = list(actuator.gainprm)
-        gain[0] *= 1.0 + change
-        actuator.gainprm = gain
+        edits.scale_torque(spec, wheel, change)
 
 
 EFFECT = Effect(

@@ -1,7 +1,8 @@
 """Edits of wheels and casters, which a designer's parameters and the effects share.
 
 In: an MjSpec whose tires are set, and numbers in SI. Out: the specification, changed in place.
-Only these functions change camber, toe, wheel radius and caster trail; hubs keep their positions.
+Only these functions change camber, toe, wheel radius, caster trail and the gain of torques; hubs
+keep their positions.
 A designer's parameter is the new value of a quantity; an effect is a change of the present value.
 """
 
@@ -90,6 +91,14 @@ def set_radius(spec: mujoco.MjSpec, wheel: str, radius: float) -> float:
 def add_radius(spec: mujoco.MjSpec, wheel: str, change: float) -> None:
     """Make the radius of a wheel larger by `change` (m); its hub stays in place."""
     set_radius(spec, wheel, float(parts.tire_geom(spec, wheel).size[0]) + change)
+
+
+def scale_torque(spec: mujoco.MjSpec, wheel: str, change: float) -> None:
+    """Change the torque of a rear wheel's actuator by the fraction `change` (1)."""
+    actuator = parts.named(spec.actuators, wheel, "actuator")
+    gain = list(actuator.gainprm)
+    gain[0] *= 1.0 + change
+    actuator.gainprm = gain
 
 
 def add_trail(spec: mujoco.MjSpec, caster: str, length: float) -> None:

@@ -105,10 +105,7 @@ def _slip(spec: mujoco.MjSpec, value: float) -> None:
 def _torque(spec: mujoco.MjSpec, value: float) -> None:
     """Gain of the torques of both rear wheels: what calibrates one sensor calibrates the other."""
     for wheel in parts.REAR:
-        actuator = parts.named(spec.actuators, wheel, "actuator")
-        gain = list(actuator.gainprm)
-        gain[0] *= 1.0 + value
-        actuator.gainprm = gain
+        edits.scale_torque(spec, wheel, value)
 
 
 # Relative. How much tires give way downwards and along their heading is an assumption in every

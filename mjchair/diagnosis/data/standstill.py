@@ -40,11 +40,11 @@ def rests(trial: Trial) -> list[tuple[float, float]]:
 
     A run that begins at rest does not come to rest there.
     """
-    time, slow = trial.time, _slower(trial)
+    time, slow, rocking = trial.time, _slower(trial), _stretches(_slower(trial, ROCKING))
     out: dict[int, int] = {}
     for first, after in still_stretches(trial):
         # it first stood where it began to rock
-        begins = max(a for a, b in _stretches(_slower(trial, ROCKING)) if a <= first < b)
+        begins = max(a for a, b in rocking if a <= first < b)
         out[begins + int(np.argmax(slow[begins:]))] = after
     return [
         (float(time[a]) - BEFORE, min(float(time[a]) + ROCKS, float(time[b - 1])))
