@@ -349,9 +349,9 @@ class LinearSearch(search.Search):
         """None: around the fit the algebra is what it is around the chair without effects."""
         return None
 
-    def _from_more(self, fewer: Hypothesis, more: Any, own: Any) -> Any:
-        """The fit's own: a linear one is never stuck."""
-        return own
+    def or_whole(self, here: Any) -> Any:
+        """What is here: a linear system neither slides nor shimmies."""
+        return here
 
     def anew(self, tried: Any) -> Any:
         """The fit itself: a linear system is the same around any chair."""
@@ -420,7 +420,7 @@ def _gap_after(base: Any, fitted: Any) -> Any:
         back=np.r_[system.back, np.zeros(len(put))],
     )
     keys = [t.effect.key for t in fitted.variant.terms]
-    return gaps.test_gap(base.bench, inner, bounded.reduce(inner, base.bench.windows), keys)
+    return gaps.test_gap(base.bench, inner, base.bench.windows, keys)
 
 
 def base_of(bed: Bed, y: Sequence[Array]) -> Any:
@@ -437,7 +437,7 @@ def base_of(bed: Bed, y: Sequence[Array]) -> Any:
         chi2=np.array([bounded.chi2(system, int(i), step_) for i in bed.windows]),
         system=system,
         columns=[],
-        variant=SimpleNamespace(terms=()),
+        variant=SimpleNamespace(terms=(), offsets={}),
     )
     return SimpleNamespace(
         bench=bench,
@@ -513,7 +513,7 @@ def linear() -> Iterator[None]:
 def diagnosed(bed: Bed, y: Sequence[Array]) -> dict[str, Any]:
     """What the diagnosis' own selection and weights say of drawn data."""
     base = base_of(bed, y)
-    gap = gaps.test_gap(base.bench, base.system, base.reduced)
+    gap = gaps.test_gap(base.bench, base.system, base.bench.windows)
     choice = search.choose(base, gap, lambda _: None) if gap.exists else None
     found = weights(base, choice)
     first = sorted(found, key=lambda n: -(found[n].prior + found[n].evidence / 4.0))[:SHOWN]

@@ -32,6 +32,15 @@ def made(seed):
     return system, rows, residual
 
 
+def test_nearer_walls_leave_more_to_the_effects():
+    for seed in range(10):
+        wide = bounded.reduce(made(seed)[0], [0])
+        narrow = wide.narrowed(1.0)
+        assert narrow.total > wide.total  # the plain chair fits worse
+        assert wide.total - wide.gain([0]) <= narrow.total - narrow.gain([0]) + 1e-6
+        assert wide.narrowed(bounded.WALL).total == pytest.approx(wide.total, rel=1e-9)
+
+
 @pytest.mark.parametrize("which", [[], [NUISANCES], [NUISANCES, NUISANCES + 1]])
 def test_walls_end_at_the_least_chi2(which):
     for seed in range(40):

@@ -184,3 +184,20 @@ def test_bearings_brake_a_wheel_in_the_air_as_they_say(speed):
         mujoco.mj_forward(model, data)
         drag.append(data.qfrc_passive[dof])
     assert drag[0] - drag[1] == pytest.approx(0.05 * speed, rel=1e-9)
+
+
+def test_a_light_wind_is_told_from_still_air_and_what_goes_with_it():
+    """Beside a faster chair the force of a light wind is linear in it, of either sign."""
+    seed = find("wind").seeds[-1]
+    speed = np.linspace(1.0, 2.0, 20)
+
+    def force(x, y, drag_area):
+        along = speed - x
+        return -drag_area * np.hypot(along, y) * along
+
+    parts = np.array([force(**{**p, "y": 0.0}) for p in seed.points])
+    for truth in (-0.2, 0.15):
+        coefficients = np.linalg.lstsq(parts[:2].T, force(truth, 0.0, 0.9), rcond=None)[0]
+        values = seed.combine(np.r_[coefficients, 0.0])
+        assert values["x"] == pytest.approx(truth, rel=0.35)  # where a fit begins
+        assert values["drag_area"] == pytest.approx(0.9, rel=0.1)

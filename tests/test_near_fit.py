@@ -97,7 +97,8 @@ def begun(monkeypatch, first):
     monkeypatch.setattr(further_effects, "replace", lambda base, found: found)
     monkeypatch.setattr(further_effects, "with_noise", lambda base, bench: bench)
     monkeypatch.setattr(further_effects, "Search", lambda found, _: found)
-    base = SimpleNamespace(bench=SimpleNamespace(power=1.0), nuisances={})
+    simulator = SimpleNamespace(windows=[])
+    base = SimpleNamespace(bench=SimpleNamespace(power=1.0, simulator=simulator), nuisances={})
     search = SimpleNamespace(base=base, say=lambda _: None)
     found = further_effects.without_hidden(search)
     return None if found is search else found

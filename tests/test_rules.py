@@ -107,6 +107,29 @@ def test_what_held_out_trials_say(before, after, holds):
     assert rules.carries_over(HeldOut(before=before, after=after, dof=100.0)) == holds
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "again"),
+    [
+        (1000.0, 120.0, True),  # held-out trials show what the effects explain
+        (1000.0, 600.0, False),
+        (130.0, 110.0, False),  # they show nothing
+    ],
+)
+def test_what_held_out_trials_show_again_did_not_happen_once(before, after, again):
+    """A patch that one run and a held-out one pass over was called an event, and no answer."""
+    held = HeldOut(before=before, after=after, dof=100.0)
+    assert rules.happened_once(event=990.0, gain=1000.0)
+    assert rules.happened_once(event=990.0, gain=1000.0, held=held) != again
+    one_run = replace(CLEAR, gain_by_run=7.0, held_out=held)
+    assert rules.explains(one_run) == again
+
+
+@pytest.mark.parametrize(("before", "wrong"), [(190.0, True), (180.0, False)])
+def test_a_chair_that_foretells_wrongly_is_no_answer(before, wrong):
+    """Twice three standard deviations of 100 degrees of freedom are 85."""
+    assert rules.foretells_wrongly(HeldOut(before=before, after=0.0, dof=100.0)) == wrong
+
+
 def share(**changes):
     known = {
         "gained": 900.0,

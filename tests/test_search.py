@@ -5,6 +5,7 @@ In: totals (chi2) of fits, given by name. Out: which fit the search takes.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from unittest import mock
 
@@ -54,6 +55,7 @@ def fits(monkeypatch):
     def terms(reduced, hypothesis, share=1.0):
         return tuple(SimpleNamespace(effect=s.effect) for s in hypothesis.starts)
 
+    monkeypatch.setattr(search.whole_sizes, "fits", lambda *_: ())
     monkeypatch.setattr(search, "refit", refit)
     monkeypatch.setattr(search.hypotheses, "terms", terms)
     return SimpleNamespace(asked=asked, answers=answers)
@@ -63,7 +65,7 @@ def searching():
     base = SimpleNamespace(
         bench=None,
         nuisances={},
-        plain=SimpleNamespace(total=2000.0),
+        plain=SimpleNamespace(total=2000.0, variant=Variant(())),
         reduced=SimpleNamespace(total=2000.0),
         around=SimpleNamespace(track="as given", variant=Variant(())),
         found=None,
@@ -224,6 +226,66 @@ def test_a_single_effect_may_be_what_the_search_for_noise_left_over(fits, monkey
     looking.base.best = SimpleNamespace(starts=(ROLLING, MOTOR), fitted=both)
     best, left = search._grown(looking)
     assert best.hypothesis.keys == ("motor",) and best.fitted is motor and not left.exists
+
+
+@pytest.mark.parametrize(
+    ("offset", "narrow", "best"),
+    [
+        (3.0, 1110.0, "motor"),  # on its wall: with nearer walls another effect is the best
+        (3.0, 1600.0, "rolling"),  # which fits worse
+        (1.0, 1110.0, "rolling"),  # nothing is far from what it is known to be
+    ],
+)
+def test_what_is_roughly_known_hides_no_effect(fits, monkeypatch, offset, narrow, best):
+    """Linear algebra with wide walls laid a motor on a centre of mass."""
+    fits.answers.update(
+        {
+            ("rolling", "as given"): fit(1500.0, "rolling"),
+            ("motor", "as given"): fit(narrow, "motor"),
+        }
+    )
+    other = Hypothesis((MOTOR,), gain=24_000.0, score=24_000.0)
+
+    def put(one, **changes):
+        stub = isinstance(one, SimpleNamespace)
+        return SimpleNamespace(**vars(one) | changes) if stub else replace(one, **changes)
+
+    monkeypatch.setattr(search, "replace", put)
+    monkeypatch.setattr(search.hypotheses, "singles", lambda *_: [other])
+    monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
+    monkeypatch.setattr(search, "believable", lambda _: True)
+    monkeypatch.setattr(search, "gap_after", lambda _, f: SimpleNamespace(exists=f.total > 1200.0))
+    looking = searching()
+    looking.base.plain.variant = Variant((), offsets={"centre_x": offset})
+    looking.base.starts = ()
+    wide = looking.base.reduced
+    wide.narrowed = lambda wall: SimpleNamespace(total=26_000.0)
+    first = looking.fit(ONE)
+    found, _ = looking.or_as_given((first, SimpleNamespace(exists=True)))
+    assert found.hypothesis.keys == (best,)
+    assert (looking.base.reduced is wide) == (best == "rolling")
+
+
+@pytest.mark.parametrize("total", [1110.0, 1600.0])
+def test_an_effect_of_a_whole_size_may_be_the_better_one(fits, monkeypatch, total):
+    """A patch of the floor stood for casters that shimmy."""
+    fits.answers.update(
+        {
+            ("rolling", "as given"): fit(1500.0, "rolling"),
+            ("rolling", "track of rolling"): fit(1500.0, "rolling"),
+        }
+    )
+    whole = fit(total, "motor")
+    monkeypatch.setattr(search.whole_sizes, "fits", lambda *_: [(MOTOR, whole)])
+    monkeypatch.setattr(search.hypotheses, "weigh", lambda *_: Hypothesis((MOTOR,), 9.0, 9.0))
+    monkeypatch.setattr(search, "believable", lambda _: True)
+    monkeypatch.setattr(search, "gap_after", lambda *_: SimpleNamespace(exists=False))
+    looking = searching()
+    here = (looking.fit(ONE), SimpleNamespace(exists=True))
+    found, left = looking.or_whole(here)
+    assert (found.fitted is whole and not left.exists) == (total < 1500.0)
+    closed = (here[0], SimpleNamespace(exists=False))
+    assert looking.or_whole(closed) is closed  # where no gap is left, none is looked for
 
 
 def test_a_fit_that_cannot_come_near_the_best_is_not_started_again(fits):

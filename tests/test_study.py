@@ -6,7 +6,7 @@ import pytest
 import mjchair
 from mjchair.diagnosis.data import first_state, standstill
 from mjchair.diagnosis.data.study import Run
-from mjchair.diagnosis.data.windows import cut
+from mjchair.diagnosis.data.windows import calm, cut
 from mjchair.diagnosis.driven_run import drive_run
 from mjchair.diagnosis.replay import noise
 from mjchair.errors import MjchairError
@@ -305,6 +305,24 @@ def test_a_chair_that_turns_back_or_begins_at_rest_does_not_come_to_rest():
         assert standstill.rests(run.trial) == []
         rows = np.concatenate([w.rows for w in cut([run], 0.002)])
         assert np.array_equal(rows, np.flatnonzero(time >= 0.2))
+
+
+def test_windows_are_short_where_a_caster_shimmies():
+    """A person who steers, noise and a caster that turns over once do not shimmy."""
+    time = np.arange(0.0, 8.0, 0.01)
+    shakes = 0.3 * np.sin(2.0 * np.pi * 7.0 * time) * ((time > 3.0) & (time < 5.0))
+    steers = 0.6 * np.sin(2.0 * np.pi * 0.8 * time)
+    over = np.pi * (time > 4.0) + 0.02 * np.random.default_rng(5).standard_normal(time.size)
+    runs = [_run(time, {"left_caster_angle": angle}) for angle in (shakes + steers, steers, over)]
+    shaky, *calm_ones = (cut([run], 0.002) for run in runs)
+    for windows in calm_ones:
+        assert max(w.last - w.first for w in windows) > 1.9
+        assert not any(w.shimmies for w in windows)
+    assert max(w.last - w.first for w in shaky) < 0.8
+    inside = [w for w in shaky if w.shimmies]
+    assert 2.0 < inside[0].first < 3.1 and 4.9 < inside[-1].last < 6.0
+    assert calm(shaky, range(len(shaky))) == [k for k, w in enumerate(shaky) if not w.shimmies]
+    assert calm(inside, range(len(inside))) == list(range(len(inside)))  # else none were left
 
 
 def test_a_stop_is_said(tmp_path):

@@ -17,22 +17,31 @@ from mjchair.effects.library import MECHANICAL, find
 from mjchair.errors import MjchairError
 
 
-def begun(monkeypatch, effect, chi2):
-    """The size at which a fit of the effect begins; None: none is better than no effect."""
+def begun(monkeypatch, effect, chi2, other=None):
+    """The size at which a fit of the effect begins; None: none is better than no effect.
+
+    other: chi2 of a fit of other effects.
+    """
     (parameter,) = [p for p in effect.fitted if p.whole]
 
     def told(base, variant, windows):
         return chi2(variant.terms[0].values[parameter.name])
 
     monkeypatch.setattr(whole_sizes, "_at", told)
-    monkeypatch.setattr(whole_sizes, "_chi2", lambda *_: chi2(parameter.neutral))
+    plain = SimpleNamespace(variant=Variant(()), track=None, chi2=np.arange(6.0))
+    rival = None if other is None else SimpleNamespace(variant=None, track=None)
+    monkeypatch.setattr(
+        whole_sizes,
+        "_chi2",
+        lambda _, variant, *__: chi2(parameter.neutral) if variant is plain.variant else other,
+    )
     base = SimpleNamespace(
-        plain=SimpleNamespace(variant=Variant(()), track=None, chi2=np.arange(6.0)),
+        plain=plain,
         around=SimpleNamespace(variant=Variant(())),
         bench=SimpleNamespace(windows=np.arange(6)),
     )
     start = SimpleNamespace(effect=effect, free=(parameter.name,))
-    best = whole_sizes._best_size(base, start, parameter)
+    best = whole_sizes._best_size(base, start, parameter, rival)
     return None if best is None else best.terms[0].values[parameter.name]
 
 
@@ -44,6 +53,15 @@ def test_a_fit_begins_next_to_the_size_that_is_there(monkeypatch, truth):
         monkeypatch, effect, lambda v: 2000.0 - 1500.0 * math.exp(-(((v - truth) / 0.01) ** 2))
     )
     assert size == pytest.approx(truth, abs=0.008)
+
+
+@pytest.mark.parametrize(("other", "begins"), [(1400.0, True), (200.0, False)])
+def test_a_size_that_misses_half_of_what_others_bring_begins_no_fit(monkeypatch, other, begins):
+    def chi2(size):
+        return 2000.0 - 500.0 * math.exp(-(((size - 0.08) / 0.01) ** 2))
+
+    size = begun(monkeypatch, find("relaxation_length"), chi2, other)
+    assert (size is not None) == begins
 
 
 def test_a_size_that_brings_nothing_begins_no_fit(monkeypatch):

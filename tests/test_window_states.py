@@ -64,3 +64,31 @@ def test_how_long_a_window_goes_on(promise, stands, kept, rounds):
     assert going == [True] * rounds + [False] * (9 - rounds)
     search.calm = True
     assert not window_states._goes_on(chair, search, 0, kept)
+
+
+def test_a_step_that_fails_where_a_caster_shimmies_is_made_anew_with_small_changes(monkeypatch):
+    """Answers to large changes, at a coarse step, lead astray there: no step brings anything."""
+    asked = []
+
+    def answers(simulator, chair, model, errors, states, share):
+        asked.extend((model, i, share) for i in states)
+        return {i: "new" for i in states}
+
+    worse = SimpleNamespace(predicted=None, trace={})
+    monkeypatch.setattr(window_states, "_traced", lambda *_: {0: worse, 1: worse})
+    monkeypatch.setattr(window_states, "_size", lambda *_: 9.0)
+    monkeypatch.setattr(window_states, "_answers", answers)
+    monkeypatch.setattr(window_states, "_step", lambda *_: (np.ones(len(SLOW)), 5.0))
+    windows = [SimpleNamespace(shimmies=k == 0) for k in range(2)]
+    simulator = SimpleNamespace(windows=windows)
+    chair = SimpleNamespace(stands=lambda _: False, moved=lambda state, change: change)
+    errors = SimpleNamespace(applied=lambda *_: None)
+    going = {k: window_states.Search("tried", "best", 4.0) for k in range(2)}
+    slow = ["old", "old"]
+    arguments = (simulator, chair, ("fine", "coarse"), errors, going, WHITE, slow, True)
+    window_states._fit_round(*arguments)
+    assert asked == [("fine", 0, window_states.FINER)] and slow == ["new", "old"]
+    assert going[0].touchy and not going[1].touchy
+    chair.stands = lambda _: False
+    assert window_states._goes_on(chair, going[0], window_states.ROUNDS, kept=True)
+    assert not window_states._goes_on(chair, going[1], window_states.ROUNDS, kept=True)

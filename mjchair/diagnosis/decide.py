@@ -19,7 +19,13 @@ from mjchair.diagnosis.explain.calibration import NONE
 from mjchair.diagnosis.explain.choice import Choice, closure, gain
 from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.explain.gap import Gap, forces_left
-from mjchair.diagnosis.explain.left_out import held_out, held_out_gain
+from mjchair.diagnosis.explain.left_out import (
+    held_out,
+    held_out_gain,
+    held_windows,
+    on_held_out,
+    slow_part,
+)
 from mjchair.diagnosis.explain.probability import of_any, of_effects, probabilities
 from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.fit import bounded
@@ -28,7 +34,6 @@ from mjchair.diagnosis.fit.noise_levels import FORCES as FORCE_NAMES
 from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.process import force_level
 from mjchair.diagnosis.fit.slow_part import BAND
-from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.material import material
 from mjchair.diagnosis.next_experiment import design, wording
 from mjchair.diagnosis.next_experiment.design import Plan
@@ -63,7 +68,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     said = rules.verdict(gap.exists, stands)
     forces = missing_forces(base)
     size = material(base, gap, choice)
-    before = _rms(*_slow(base.plain.system, _shown_windows(base)))
+    before = _rms(*slow_part(base.plain.system, _shown_windows(base)))
     if not rules.matters(
         force=size.value,
         limit=size.limit,
@@ -108,7 +113,7 @@ def _nearest(base: Base, choice: Choice, closed: float) -> Nearest:
     return Nearest(
         effects=tuple(t.effect.key for t in choice.fitted.variant.terms),
         closure=closed,
-        remainder=_rms(*_slow(choice.fitted.system, _shown_windows(base))),
+        remainder=_rms(*slow_part(choice.fitted.system, _shown_windows(base))),
     )
 
 
@@ -117,6 +122,7 @@ def standing(
 ) -> rules.Standing:
     """The numbers that the verdict on a choice follows from."""
     fitted = choice.fitted
+    held = on_held_out(base, fitted)
     return rules.Standing(
         closure=closed,
         gap_left=choice.after.exists,
@@ -126,9 +132,9 @@ def standing(
         at_bound=bool(fitted.at_bound),
         rivals=sum(len(group) for group in choice.rivals),
         probability=of_effects(probability, choice.hypothesis.keys),
-        once=_once(base, choice),
+        once=_once(base, choice, held),
         runs=len(base.bench.simulator.study.fitted),
-        held_out=_held_out(base, fitted),
+        held_out=held,
     )
 
 
@@ -138,9 +144,10 @@ def _standing_keys(choice: Choice) -> set[str]:
     return {*choice.hypothesis.keys, *rivals}
 
 
-def _once(base: Base, choice: Choice) -> bool:
+def _once(base: Base, choice: Choice, held: rules.HeldOut | None) -> bool:
     """Whether something that happened once, in one run, fits about as well as the effects do."""
-    return rules.happened_once(event=event.largest(base), gain=choice.hypothesis.gain)
+    largest = event.largest(base)
+    return rules.happened_once(event=largest, gain=choice.hypothesis.gain, held=held)
 
 
 def _walls(choice: Choice) -> list[str]:
@@ -159,14 +166,6 @@ def _process(base: Base) -> dict[str, Estimate]:
         name: Estimate(value=force_level(process.levels, force), std=None, unit=units[force])
         for name, force in FORCE_NAMES.items()
     }
-
-
-def _held_out(base: Base, fitted: Fitted) -> rules.HeldOut | None:
-    held = _held_windows(base)
-    if not held.size:
-        return None
-    before, dof = _slow(base.plain.system, held)
-    return rules.HeldOut(before=before, after=_slow(fitted.system, held)[0], dof=dof)
 
 
 def _plan(base: Base, choice: Choice, once: bool) -> tuple[Plan | None, list[str]]:
@@ -266,31 +265,20 @@ def _rms(chi2: float, dof: float) -> float:
     return float(np.sqrt(max(chi2, 0.0) / max(dof, 1.0)))
 
 
-def _slow(system: System, windows: NDArray[np.int64]) -> tuple[float, float]:
-    """Chi2 of the slow residual of the windows, and its degrees of freedom."""
-    cells = [system.cells[int(i)] for i in windows]
-    return sum(c.total for c in cells), sum(c.total_dof for c in cells)
-
-
-def _held_windows(base: Base) -> NDArray[np.int64]:
-    held = {i for i, r in enumerate(base.bench.simulator.study.runs) if r.hold_out}
-    return np.array([i for i, w in enumerate(base.bench.simulator.windows) if w.run in held], int)
-
-
 def _shown_windows(base: Base) -> NDArray[np.int64]:
     """Held-out windows, or all that were fitted to where none is held out."""
-    held = _held_windows(base)
+    held = held_windows(base)
     return held if held.size else base.bench.windows
 
 
 def _summary(base: Base, gap: Gap, choice: Choice | None) -> GapSummary:
     """The gap as it was, and as the corrected chair leaves it; without one there is no after."""
-    held, windows = _held_windows(base), _shown_windows(base)
-    before, dof = _slow(base.plain.system, windows)
+    held, windows = held_windows(base), _shown_windows(base)
+    before, dof = slow_part(base.plain.system, windows)
     who = "held-out trials" if held.size else "all trials, since none is held out"
     return GapSummary(
         before=_rms(before, dof),
-        after=_rms(_slow(choice.fitted.system, windows)[0], dof) if choice else None,
+        after=_rms(slow_part(choice.fitted.system, windows)[0], dof) if choice else None,
         scope=f"{who}: rms of the whitened residual below {BAND:g} Hz",
         p_value=gap.p,
         p_value_after=choice.after.p if choice else None,

@@ -14,7 +14,8 @@ from mjchair.diagnosis.data.study import Study
 from mjchair.diagnosis.data.study_file import read_study
 from mjchair.diagnosis.decide import conclude
 from mjchair.diagnosis.explain.further_effects import without_hidden
-from mjchair.diagnosis.explain.screening import Say, gap_after, prepare, screen_columns, silent
+from mjchair.diagnosis.explain.left_out import plain_gap
+from mjchair.diagnosis.explain.screening import Say, prepare, screen_columns, silent
 from mjchair.diagnosis.explain.search import Search, choose
 from mjchair.diagnosis.replay import strokes
 from mjchair.diagnosis.replay.cache import Store
@@ -68,7 +69,7 @@ def diagnose(
         search = without_hidden(Search(base, say))
         base = search.base
         say("the gap")
-        gap = gap_after(base, base.plain)
+        gap = plain_gap(base)
         say("effects, one and two at a time")
         return conclude(base, gap, choose(base, gap, say, search) if gap.exists else None)
 

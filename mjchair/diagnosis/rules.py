@@ -136,9 +136,12 @@ def verdict(gap: bool, choice: Standing | None) -> Verdict:
 
 def explains(choice: Standing) -> bool:
     """Whether the effects are an answer, alone or beside their rivals, with a remainder or not."""
-    if choice.closure < PARTLY or choice.gain_by_run < HELD:
+    if choice.closure < PARTLY:
         return False
-    return choice.held_out is None or carries_over(choice.held_out)
+    if choice.held_out is None:
+        return choice.gain_by_run >= HELD
+    foretold = choice.gain_by_run >= HELD or shows_again(choice.held_out)
+    return foretold and carries_over(choice.held_out)
 
 
 def carries_over(held: HeldOut) -> bool:
@@ -146,9 +149,24 @@ def carries_over(held: HeldOut) -> bool:
 
     A gap that shows in them must close by CARRIED; none must open.
     """
-    scatter = 3.0 * math.sqrt(2.0 * held.dof)
+    scatter = _scatter(held)
     gap, left = held.before - held.dof, held.after - held.dof
     return left < max((1.0 - CARRIED) * gap, scatter) if gap > scatter else left < gap + scatter
+
+
+def shows_again(held: HeldOut) -> bool:
+    """Whether held-out trials, which no fit has seen, show what the effects explain."""
+    return held.before - held.dof > _scatter(held) and carries_over(held)
+
+
+def foretells_wrongly(held: HeldOut) -> bool:
+    """Whether a chair without effects is far off on held-out trials, where its fit may not be."""
+    return held.before - held.dof > 2.0 * _scatter(held)
+
+
+def _scatter(held: HeldOut) -> float:
+    """Chi2 by which noise alone may be off."""
+    return 3.0 * math.sqrt(2.0 * held.dof)
 
 
 def sure(choice: Standing) -> bool:
@@ -215,13 +233,14 @@ def matters(
     return not told and (gap >= SMALL_GAP or certain)
 
 
-def happened_once(*, event: float, gain: float) -> bool:
+def happened_once(*, event: float, gain: float, held: HeldOut | None = None) -> bool:
     """Whether an event in time carries about what the effects do.
 
     Args:
       event: chi2 that forces bring which act for a moment in one run. gain: that the effects bring.
+      held: held-out trials; an event is over in these.
     """
-    return event > CARRIES * gain
+    return event > CARRIES * gain and not (held is not None and shows_again(held))
 
 
 def believable(*, std: float, change: float, width: float) -> bool:

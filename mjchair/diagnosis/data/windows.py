@@ -1,20 +1,22 @@
 """Windows: stretches of a run whose initial state is free.
 
-In: runs. Out: windows of about two seconds. Over a whole run every small error adds up and
-everything becomes significant; over a second or two only forces show. A window is simulated from a
+In: runs. Out: windows of about two seconds, shorter in runs in which a caster shimmies. Over a
+whole run every small error adds up and everything becomes significant; over a second or two only
+forces show. A window is simulated from a
 little before it begins (the lead), so that what is fast in the chair has settled on the slow state
 when its first sample counts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mjchair.diagnosis.data import shimmy
 from mjchair.diagnosis.data.first_state import stops
 from mjchair.diagnosis.data.standstill import rests
 from mjchair.diagnosis.data.study import Run
@@ -22,6 +24,7 @@ from mjchair.diagnosis.data.study import Run
 Array = NDArray[np.float64]
 
 LENGTH = 2.0  # s, of a window
+SHORT = 0.7  # s, where a caster shimmies: over a longer one its swings hang on too little
 LEAD = 0.2  # s
 FEWEST = 5  # samples of a window
 
@@ -33,7 +36,7 @@ class Window:
     Attributes:
       run: index of the run in the study. index: of the window in its run.
       start: where its simulation starts, s. first, last: where its samples count, s.
-      rows: indices of the samples, in the run's time.
+      rows: indices of the samples, in the run's time. shimmies: whether a caster does, there.
     """
 
     run: int
@@ -42,6 +45,7 @@ class Window:
     first: float
     last: float
     rows: NDArray[np.int64]
+    shimmies: bool = False
 
 
 def cut(runs: Sequence[Run], step: float, length: float = LENGTH) -> list[Window]:
@@ -51,8 +55,8 @@ def cut(runs: Sequence[Run], step: float, length: float = LENGTH) -> list[Window
     """
     windows: list[Window] = []
     for i, run in enumerate(runs):
-        time, mine = run.trial.time, list[Window]()
-        for edges in _edges(run, step, length):
+        time, mine, swings = run.trial.time, list[Window](), shimmy.stretches(run.trial)
+        for edges in _edges(run, step, SHORT if swings else length):
             for begin, end in pairwise(edges):
                 at_start = begin == time[0]
                 first = begin + (LEAD if at_start else 0.0)
@@ -60,9 +64,18 @@ def cut(runs: Sequence[Run], step: float, length: float = LENGTH) -> list[Window
                 if rows.size < FEWEST:
                     continue
                 start = begin - (0.0 if at_start else LEAD)
-                mine.append(Window(i, len(mine), float(start), float(first), float(end), rows))
+                there = any(a < end and first < b for a, b in swings)
+                mine.append(
+                    Window(i, len(mine), float(start), float(first), float(end), rows, there)
+                )
         windows += mine
     return windows
+
+
+def calm(windows: Sequence[Window], which: Collection[int]) -> list[int]:
+    """Of some windows, those in which no caster shimmies; all of them where every one does."""
+    quiet = [int(i) for i in which if not windows[i].shimmies]
+    return quiet or [int(i) for i in which]
 
 
 def _edges(run: Run, step: float, length: float) -> list[Array]:

@@ -24,6 +24,7 @@ from mjchair.diagnosis.explain.column_ids import (
     ForceGroup,
     Group,
 )
+from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.fit.column_ids import ColumnId
@@ -99,7 +100,7 @@ def whole(reduced: Reduced, which: Sequence[int]) -> tuple[float, float]:
 def test_gap(
     bench: Bench,
     system: System,
-    reduced: Reduced,
+    windows: Sequence[int],
     skip: Sequence[str] = (),
     gain: float = 0.0,
     seed: int = 0,
@@ -107,9 +108,11 @@ def test_gap(
     """Test what is left.
 
     Args:
-      reduced: with everything that is accepted eliminated. skip: effects that are in already.
+      system: with everything that is accepted eliminated. windows: that are tested.
+      skip: effects that are in already.
       gain: chi2 that these bring.
     """
+    reduced = bounded.reduce(system, windows)
     tested = {
         group: which
         for group, which in groups(reduced.columns).items()
@@ -118,11 +121,11 @@ def test_gap(
     }
     tests = [_test(group, *whole(reduced, which)) for group, which in tested.items()]
     family = _family(reduced, list(tested.values()), tests, seed) if tests else 1.0
-    cells = _cell_tests(bench, system)
+    cells = _cell_tests(bench, system, windows)
     worst = min((t.p for t in cells), default=1.0)
     p = min(1.0, 2.0 * min(family, 1.0 - (1.0 - worst) ** max(len(cells), 1)))
     sigmas = max((t.sigmas for t in (*tests, *cells)), default=0.0)
-    mine = set(bench.windows.tolist())
+    mine = set(windows)
     total = sum(c.total for i, c in enumerate(system.cells) if i in mine)
     dof = sum(c.total_dof for i, c in enumerate(system.cells) if i in mine)
     ordered = sorted([*tests, *cells], key=lambda t: -t.sigmas)
@@ -178,10 +181,10 @@ def _family(
     return float(min(1.0 / DRAWS, effective * smallest))
 
 
-def _cell_tests(bench: Bench, system: System) -> list[Test]:
+def _cell_tests(bench: Bench, system: System, windows: Sequence[int]) -> list[Test]:
     out = []
     channels = bench.simulator.channels
-    for i in bench.windows:
+    for i in windows:
         w = bench.simulator.windows[i]
         name = bench.simulator.study.runs[w.run].trial.name
         for k, channel in enumerate(channels):

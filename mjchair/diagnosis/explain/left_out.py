@@ -7,11 +7,14 @@ out, in chi2.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain.gap import Gap
+from mjchair.diagnosis.explain.screening import Base, gap_after
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.nonlinear import Fitted
@@ -90,3 +93,34 @@ def with_terms(fitted: Fitted) -> tuple[System, list[int]]:
 def held_out_gain(base: Base, fitted: Fitted, by: str = "run") -> float:
     """What a fit brings on the parts that it did not see, in chi2."""
     return held_out(base.bench, (base.plain.system, []), with_terms(fitted), by)
+
+
+def on_held_out(base: Base, fitted: Fitted) -> rules.HeldOut | None:
+    """The held-out trials before and after a fit, which has not seen them; None: there are none."""
+    held = held_windows(base)
+    if not held.size:
+        return None
+    before, dof = slow_part(base.plain.system, held)
+    return rules.HeldOut(before=before, after=slow_part(fitted.system, held)[0], dof=dof)
+
+
+def slow_part(system: System, windows: NDArray[np.int64]) -> tuple[float, float]:
+    """Chi2 of the slow residual of the windows, and its degrees of freedom."""
+    cells = [system.cells[int(i)] for i in windows]
+    return sum(c.total for c in cells), sum(c.total_dof for c in cells)
+
+
+def held_windows(base: Base) -> NDArray[np.int64]:
+    """The windows of the trials that are held out of every fit."""
+    held = {i for i, r in enumerate(base.bench.simulator.study.runs) if r.hold_out}
+    return np.array([i for i, w in enumerate(base.bench.simulator.windows) if w.run in held], int)
+
+
+def plain_gap(base: Base) -> Gap:
+    """Test what the chair without effects leaves, also on trials that it was not fitted to.
+
+    What is only roughly known may take an effect for itself, and then foretells wrongly.
+    """
+    gap, held = gap_after(base, base.plain), on_held_out(base, base.plain)
+    foretold = held is None or not rules.foretells_wrongly(held)
+    return gap if foretold else replace(gap, exists=True)

@@ -13,6 +13,7 @@ import numpy as np
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.data import first_state, roughly_known
 from mjchair.diagnosis.data.study import Study, with_copied_wheels
+from mjchair.diagnosis.data.windows import calm
 from mjchair.diagnosis.explain import candidates, hypotheses, missing_force, noise_shown
 from mjchair.diagnosis.explain import gap as gaps
 from mjchair.diagnosis.explain.candidates import Around, Start
@@ -235,9 +236,14 @@ def system_around(base: Base, bench: Bench, fitted: Fitted) -> System:
 
 
 def gap_after(base: Base, fitted: Fitted) -> Gap:
-    """Test what a fit leaves, with its own parameters free."""
-    bench = base.bench
+    """Test what a fit leaves, with its own parameters free.
+
+    A caster that shimmies hangs on so little that no fit leaves noise alone there. Once an effect
+    is in that makes it shimmy, only the other windows tell of what is missing besides.
+    """
+    bench, terms = base.bench, fitted.variant.terms
     system = system_around(base, bench, fitted)
-    keys = [t.effect.key for t in fitted.variant.terms]
+    made = any(p.whole for term in terms for _, p in term.parameters)
+    windows = calm(bench.simulator.windows, bench.windows) if made else bench.windows.tolist()
     gain = base.plain.total - fitted.total
-    return gaps.test_gap(bench, system, bounded.reduce(system, bench.windows), keys, gain)
+    return gaps.test_gap(bench, system, windows, [t.effect.key for t in terms], gain)

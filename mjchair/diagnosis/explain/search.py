@@ -14,14 +14,14 @@ from operator import attrgetter
 import numpy as np
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import hypotheses
+from mjchair.diagnosis.explain import hypotheses, whole_sizes
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Choice, Rival, gain, is_there
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.left_out import held_out, with_terms
 from mjchair.diagnosis.explain.near_fit import NearFit, near_fit
-from mjchair.diagnosis.explain.screening import Base, Found, Say, gap_after
+from mjchair.diagnosis.explain.screening import FAR, Base, Found, Say, gap_after
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
 from mjchair.diagnosis.fit.variant import Term, Variant
@@ -34,6 +34,7 @@ REFITTED = 5  # rivals of an effect that is alone
 GROWN = 3  # pairs from which hypotheses of three are grown
 BESIDE = 3  # rivals of each effect that has others beside it
 SHARES = (0.875, 0.75, 0.625, 0.5, 0.375, 0.25, 0.125)  # of linear coefficients, for a new start
+NARROW = 1.0  # standard deviations: a wall for what may have taken an effect for itself
 SWAPS = 2  # times that a rival takes the place of the chosen hypothesis
 
 
@@ -87,13 +88,15 @@ def _grown(search: Search) -> WithGap | None:
     while size < rules.MOST and (here is None or here[1].exists):
         size += 1
         more = search.further(here[0] if here else None, size)
+        if size == 1:
+            more = search.or_as_given(more)
         if more is None and here is None:
             continue
         if more is None or (here is not None and not search.is_worth(here[0], more[0])):
             break  # where no second effect stands beside the first, no third does
         here = search.settled(more)
         if size == 1:
-            here = search.or_left_over(here)
+            here = search.or_whole(search.or_left_over(here))
     return here
 
 
@@ -130,8 +133,9 @@ class Search:
         return _commonest(self, options) if options and options[0].score > 0.0 else None
 
     def promises(self) -> bool:
-        """Whether any effect brings anything, alone or beside those that were found before."""
-        return self.base.found is not None or self.best_single() is not None
+        """Whether any effect may bring anything, alone or beside those that were found before."""
+        known = self.base.found is not None or _goes_far(self.base.plain)
+        return known or self.best_single() is not None
 
     def found(self) -> WithGap | None:
         """The effects that were found before the search, and the gap that they leave."""
@@ -177,6 +181,27 @@ class Search:
         best, left = here
         return best, gap_after(self.base, self.anew(best)) if left.exists else left
 
+    def or_as_given(self, here: WithGap | None) -> WithGap | None:
+        """The single effect, or a better one that leaves what is roughly known nearly as given.
+
+        What is roughly known may take an effect for itself, some numbers far from what they are
+        known to be. Then linear algebra that is wrong by little of a large effect does not see the
+        effect; with nearer walls it does. From there on it weighs with these.
+        """
+        wide = self.base
+        if not _goes_far(wide.plain):
+            return here
+        if here is not None and not here[1].exists and not _goes_far(here[0].fitted):
+            return here
+        self.base = replace(wide, reduced=wide.reduced.narrowed(NARROW))
+        other = self.best_of(hypotheses.singles(self.base.reduced, wide.starts), patient=False)
+        best = _better(here, other)
+        if best is here:
+            self.base = wide
+        else:
+            self.listed.clear()
+        return best
+
     def or_left_over(self, here: WithGap) -> WithGap:
         """The single effect, or a better one that was left over while the noise was sought.
 
@@ -196,6 +221,25 @@ class Search:
         if tried is None or tried.price >= here[0].price or not believable(tried.fitted):
             return here
         return tried, gap_after(self.base, self.anew(tried))
+
+    def or_whole(self, here: WithGap) -> WithGap:
+        """The single effect, or one of a whole size that is better where the first leaves a gap.
+
+        Small changes do not lead there, and what they lead to may stand in for it: a patch of the
+        floor for wheels that shimmy once.
+        """
+        if not here[1].exists:
+            return here
+        best = here[0]
+        for start, fitted in whole_sizes.fits(self.base, self.anew(best)):
+            tried = Tried(self.weigh([start]), fitted)
+            known = _of(tried.hypothesis, self.tried)
+            if known is None or fitted.total < known.total:
+                self.tried.insert(0, tried)
+                self.again.insert(0, tried)
+            if tried.price < best.price and believable(fitted):
+                best = tried
+        return here if best is here[0] else (best, gap_after(self.base, best.fitted))
 
     def beside(self, best: Tried) -> WithGap | None:
         """The best hypothesis with one effect more, by the linear algebra around a fit.
@@ -547,10 +591,9 @@ class Search:
         except (MjchairError, np.linalg.LinAlgError) as error:
             self._note(f"{' and '.join(hypothesis.keys)} was not tried further: {error}")
             return None
-        walled = any(abs(by) >= bounded.WALL for by in fitted.variant.offsets.values())
         if self._is_behind(fitted, best):
             pass  # what it would gain if all were made anew decides nothing
-        elif walled:
+        elif _walled(fitted):
             fitted = self._around_terms(fitted)
         elif rules.is_stuck(total=fitted.total, promised=fitted.promised):
             fitted = self._made_anew(fitted.variant, fitted.track) or fitted
@@ -590,6 +633,16 @@ class Search:
             if noted:
                 self._note(f"{noted} was not made anew: {error}")
             return None
+
+
+def _goes_far(fitted: Fitted) -> bool:
+    """Whether anything that is only roughly known is far from what it is known to be."""
+    return any(abs(by) >= FAR for by in fitted.variant.offsets.values())
+
+
+def _walled(fitted: Fitted) -> bool:
+    """Whether anything that is only roughly known stands on its wall."""
+    return any(abs(by) >= bounded.WALL for by in fitted.variant.offsets.values())
 
 
 def _of(hypothesis: Hypothesis, fits: Sequence[Rival]) -> Fitted | None:

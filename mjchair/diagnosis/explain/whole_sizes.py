@@ -1,7 +1,7 @@
 """Effects of a size at which a chair does what no small change foretells: it slides or shimmies.
 
 In: the screened columns. Out: fits that begin at such a size, where the size alone already brings
-more than it costs.
+more than it costs, and not far less than another explanation does.
 
 Linear algebra is blind to these: a tire with a little less friction does nothing until it slides,
 and a relaxation length does little until the wheels shimmy. So the windows that disagree most are
@@ -30,15 +30,19 @@ LOOKED = 4  # windows, those that disagree most
 BETWEEN = 2  # times that the best size is compared with the middles to its neighbours
 
 
-def fits(base: Base) -> Iterator[tuple[Start, Fitted]]:
-    """Fits of single effects that begin at whole sizes."""
+def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitted]]:
+    """Fits of single effects that begin at whole sizes.
+
+    Args:
+      other: a fit of other effects; a size that misses half of what it brings begins no fit.
+    """
     seen = set()
     for start in base.starts:
         p = next((p for p in start.effect.fitted if p.whole), None)
         if p is None or start.effect.key in seen:
             continue
         seen.add(start.effect.key)
-        begin = _best_size(base, start, p)
+        begin = _best_size(base, start, p, other)
         if begin is None:
             continue
         try:
@@ -47,7 +51,9 @@ def fits(base: Base) -> Iterator[tuple[Start, Fitted]]:
             continue  # this chair cannot have it
 
 
-def _best_size(base: Base, start: Start, parameter: Parameter) -> Variant | None:
+def _best_size(
+    base: Base, start: Start, parameter: Parameter, other: Fitted | None
+) -> Variant | None:
     """The chair with the best size of an effect; None: no size brings more than it costs."""
     windows = _worst_windows(base)
     neutral = start.effect.neutral()
@@ -67,7 +73,11 @@ def _best_size(base: Base, start: Start, parameter: Parameter) -> Variant | None
             look(size)
         best = min(totals, key=totals.__getitem__)
     gained = totals[parameter.neutral] - totals[best]
-    return variants[best] if gained > rules.needed(len(start.free)) else None
+    least = rules.needed(len(start.free))
+    if other is not None:
+        there = _chi2(base, other.variant, other.track, windows)
+        least = max(least, rules.REPLACES * (totals[parameter.neutral] - there))
+    return variants[best] if gained > least else None
 
 
 def _worst_windows(base: Base) -> list[int]:

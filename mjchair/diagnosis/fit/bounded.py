@@ -10,7 +10,7 @@ it. What is left (`Reduced`) weighs effects by small linear algebra alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from weakref import WeakKeyDictionary
 
@@ -64,6 +64,11 @@ class Reduced:
     def solve(self, which: Sequence[int]) -> Array:
         """Their coefficients."""
         return self._settled(which)[1]
+
+    def narrowed(self, wall: float) -> Reduced:
+        """The same with a nearer wall (standard deviations) for every nuisance."""
+        walls = np.minimum(self.sums.wall, np.where(np.isfinite(self.sums.wall), wall, np.inf))
+        return replace(self.sums, wall=walls, known={}).plain()
 
     def _settled(self, which: Sequence[int]) -> tuple[Reduced, Array]:
         """The elimination whose walls are right for these columns, and their coefficients."""

@@ -41,8 +41,8 @@ def nuisance_columns(bench: Bench, track: Track, variant: Variant) -> dict[Colum
     late = simulator.input_step() / np.sqrt(12.0)
     if late > 0.0 and track.coarse is not None:
         # a torque that changes between two samples changes anywhere between them
-        model = simulator.compile(variant.edit, coarse=True)
-        shifted = derivatives.predictions(simulator, track, model, errors, late)
+        model = simulator.compile(variant.edit)
+        shifted = derivatives.predictions(simulator, track, model, errors, late, coarse=True)
         out[RoughlyKnown("input_timing")] = [
             a - b for a, b in zip(shifted, track.coarse, strict=True)
         ]
@@ -95,11 +95,11 @@ def term_columns(
             points[key] = Point(beside.edit, factor)
     if points:
         # a point here is a whole chair, so nothing comes before its edit
-        model = simulator.compile(variant.edit, coarse=True)
-        base = derivatives.predictions(simulator, track, model, errors)
+        model = simulator.compile(variant.edit)
+        base = derivatives.predictions(simulator, track, model, errors, coarse=True)
         for key, point in points.items():
-            model = simulator.compile(point.edit, coarse=True)
-            edited = derivatives.predictions(simulator, track, model, errors)
+            model = simulator.compile(point.edit)
+            edited = derivatives.predictions(simulator, track, model, errors, coarse=True)
             out[key] = [point.factor * (e - y) for e, y in zip(edited, base, strict=True)]
     return {key: out[key] for term in variant.terms for key, _ in term.parameters}
 

@@ -56,8 +56,9 @@ def differences(
     with installed():
         if any(not point.fine for point in points):
             if track.coarse is None or seen != track.seen:
-                base = simulator.compile(base_edit, coarse=True)
-                track.coarse, track.seen = predictions(simulator, track, base, seen), seen
+                base = simulator.compile(base_edit)
+                track.coarse = predictions(simulator, track, base, seen, coarse=True)
+                track.seen = seen
             coarse = track.coarse
         for point in points:
 
@@ -66,9 +67,9 @@ def differences(
                     base_edit(spec)
                 point.edit(spec)
 
-            model = simulator.compile(edit, coarse=not point.fine)
             reference = track.predicted if point.fine else coarse
-            edited = predictions(simulator, track, model, seen)
+            model = simulator.compile(edit)
+            edited = predictions(simulator, track, model, seen, coarse=not point.fine)
             change = [point.factor * (e - y) for e, y in zip(edited, reference, strict=True)]
             columns.append(_unwrapped(simulator, change))
     return columns
@@ -80,10 +81,17 @@ def predictions(
     model: mujoco.MjModel,
     errors: SensorErrors,
     late: float = 0.0,
+    coarse: bool = False,
 ) -> Column:
-    """What a model predicts from the states of a track, with its inputs `late` (s)."""
+    """What a model predicts from the states of a track, with its inputs `late` (s).
+
+    Args:
+      coarse: whether at the coarse step, for differences; not so in windows that are touchy.
+    """
+    rough = simulator.coarsened(model) if coarse else model
     jobs = [
-        Job(model, w, s, late=late) for w, s in zip(simulator.windows, track.states, strict=True)
+        Job(model if i in track.touchy else rough, w, s, late=late)
+        for i, (w, s) in enumerate(zip(simulator.windows, track.states, strict=True))
     ]
     return [
         errors.applied(simulator, w, o.predicted)

@@ -91,7 +91,7 @@ def pulse_answers(
 ) -> list[Array]:
     """What each pulse of one newton or newton metre changes in its own window, (rows, channels)."""
     out = []
-    model = simulator.compile(base_edit, coarse=True)
+    model = simulator.coarsened(simulator.compile(base_edit))
     chair = Chair(model)  # an effect may add joints before the wheels'
     with installed():
         reference = predictions(simulator, track, model, SensorErrors(simulator.channels))

@@ -103,10 +103,8 @@ class WindowSimulator:
             return self.step
         return 2.0 * self.step
 
-    def compile(
-        self, edit: Callable[[mujoco.MjSpec], None] | None = None, coarse: bool = False
-    ) -> mujoco.MjModel:
-        """The base model, edited; `coarse` for differences.
+    def compile(self, edit: Callable[[mujoco.MjSpec], None] | None = None) -> mujoco.MjModel:
+        """The base model, edited.
 
         Raises:
           MjchairError: the edit makes what no model can be.
@@ -115,8 +113,7 @@ class WindowSimulator:
         try:
             if edit is not None:
                 edit(spec)
-            model = spec.compile()
-            return self.coarsened(model) if coarse else model
+            return spec.compile()
         except MjchairError:
             raise
         except (ValueError, mujoco.FatalError) as error:

@@ -29,6 +29,7 @@ from mjchair.simulation.initial import position_joints, start
 Array = NDArray[np.float64]
 ROUNDS = 2  # Gauss-Newton rounds a window
 MORE = 4  # further ones, as where casters flip
+FINER = 0.1  # of the steps of finite differences, where a step of the fit failed
 # of misfit, in variances of the sensors' noise, that the step of a round promises
 PROMISE = 4.0  # from which answers to the slow state are made anew where it led
 CALM = 0.1  # below which it is not taken: the elimination of the state does as much
@@ -43,6 +44,8 @@ class Track:
       slow: d predicted / d slow state, (rows, channels, 7) each, times chair.STEPS.
       trace: qpos, qvel and act along each window, after each step. coarse: predictions at the
         coarse step, once they were needed; seen: by what sensors.
+      touchy: windows whose motion answers to so small changes that derivatives need the fine step,
+        as that of a wheel that shimmies.
     """
 
     states: list[State]
@@ -51,6 +54,7 @@ class Track:
     trace: list[dict[str, Array]]
     coarse: list[Array] | None = None
     seen: SensorErrors | None = None
+    touchy: frozenset[int] = frozenset()
 
 
 def first_states(simulator: WindowSimulator, model: mujoco.MjModel) -> dict[int, State]:
@@ -136,13 +140,14 @@ def track(
     kept = before is not None and not anew
     slow = [np.empty(0)] * count if before is None else list(before.slow)
     traces = [{}] * count if before is None else list(before.trace)
+    touchy = set() if before is None else set(before.touchy)
     with installed():
         for index in sorted(by_index):
             members = by_index[index]
-            search = {i: Search(states[i], states[i]) for i in members}
+            search = {i: Search(states[i], states[i], touchy=i in touchy) for i in members}
             going = search
             # answers that are kept from another chair would lead further rounds astray
-            for round_ in range(ROUNDS if kept else ROUNDS + MORE):
+            for round_ in range(ROUNDS + MORE):
                 going = {i: s for i, s in going.items() if _goes_on(chair, s, round_, kept)}
                 if not going:
                     break
@@ -154,9 +159,11 @@ def track(
                 search[i].judge(_size(simulator, w, shown, white), shown, outcome.trace)
             for i, s in search.items():
                 states[i], predicted[i], traces[i] = s.best, s.predicted, s.trace
+                if s.touchy:
+                    touchy.add(i)
                 if before is None:
                     _hand_over(simulator, model, i, s.trace, states)
-    return Track(states, predicted, slow, traces)
+    return Track(states, predicted, slow, traces, touchy=frozenset(touchy))
 
 
 def _begun(simulator: WindowSimulator) -> list[State]:
@@ -173,6 +180,7 @@ class Search:
       state: that was tried last. best, size: the best so far, and its misfit. predicted, trace: of
         the best. change: from the best to the one that was tried. promise: by how much that
         lessens the misfit, if linear. calm: whether no step from the best is worth it.
+      touchy: whether a step failed, so that answers are made at the fine step, of small changes.
     """
 
     state: State
@@ -181,6 +189,7 @@ class Search:
     change: Array = field(default_factory=lambda: np.zeros(len(SLOW)))
     promise: float = np.inf
     calm: bool = False
+    touchy: bool = False
     predicted: Array = field(default_factory=lambda: np.empty(0))
     trace: dict[str, Array] = field(default_factory=dict)
 
@@ -197,7 +206,7 @@ def _goes_on(chair: Chair, search: Search, round_: int, kept: bool) -> bool:
     """Whether a window takes part in a round; a chair at rest answers in steps, not in slopes."""
     if search.calm:
         return False
-    if kept or chair.stands(search.state):
+    if chair.stands(search.state) or (kept and not search.touchy):
         return round_ < ROUNDS
     return search.promise > PROMISE
 
@@ -230,17 +239,24 @@ def _fit_round(
 ) -> None:
     """One Gauss-Newton step of the slow states; `kept`: their columns are known."""
     fine, coarse = models
-    good: dict[int, State] = {}
+    good: list[int] = []
+    asked: dict[int, State] = {}
     for i, outcome in _traced(simulator, fine, {i: s.state for i, s in search.items()}).items():
         s, w = search[i], simulator.windows[i]
         shown = errors.applied(simulator, w, outcome.predicted)
         if s.judge(_size(simulator, w, shown, white), shown, outcome.trace):
-            good[i] = s.state
-            continue
-        s.change, s.promise = 0.3 * s.change, 0.3 * s.promise  # a step too far
-        s.state = chair.moved(s.best, s.change)
-    if not kept:
-        for i, answers in _answers(simulator, chair, coarse, errors, good).items():
+            good.append(i)
+            if s.touchy or not kept:
+                asked[i] = s.best
+        elif w.shimmies and not s.touchy:
+            s.touchy, s.state, asked[i] = True, s.best, s.best
+            good.append(i)
+        else:
+            s.change, s.promise = 0.3 * s.change, 0.3 * s.promise  # a step too far
+            s.state = chair.moved(s.best, s.change)
+    for model, share, touchy in ((coarse, 1.0, False), (fine, FINER, True)):
+        some = {i: state for i, state in asked.items() if search[i].touchy == touchy}
+        for i, answers in _answers(simulator, chair, model, errors, some, share).items():
             slow[i] = answers
     for i in good:
         s = search[i]
@@ -258,11 +274,16 @@ def _answers(
     model: mujoco.MjModel,
     errors: SensorErrors,
     states: dict[int, State],
+    share: float,
 ) -> dict[int, Array]:
-    """How windows answer to their slow states: (rows, channels, 7) each, times chair.STEPS."""
+    """How windows answer to their slow states: (rows, channels, 7) each, times chair.STEPS.
+
+    Args:
+      share: of STEPS, by which the states are moved.
+    """
     jobs = []
     for i, state in states.items():
-        moved = [chair.moved(state, step) for step in np.diag(STEPS)]
+        moved = [chair.moved(state, step) for step in share * np.diag(STEPS)]
         jobs += [Job(model, simulator.windows[i], s) for s in (state, *moved)]
     outcomes = iter(simulator.run(jobs))
     out = {}
@@ -271,7 +292,7 @@ def _answers(
         base, *seen = (
             errors.applied(simulator, w, next(outcomes).predicted) for _ in range(1 + len(SLOW))
         )
-        out[i] = np.stack([y - base for y in seen], axis=2)
+        out[i] = np.stack([(y - base) / share for y in seen], axis=2)
     return out
 
 
