@@ -66,8 +66,8 @@ def test_how_long_a_window_goes_on(promise, stands, kept, rounds):
     assert not window_states._goes_on(chair, search, 0, kept)
 
 
-def test_a_step_that_fails_where_a_caster_shimmies_is_made_anew_with_small_changes(monkeypatch):
-    """Answers to large changes, at a coarse step, lead astray there: no step brings anything."""
+def test_a_step_that_promised_much_and_failed_is_made_anew_with_small_changes(monkeypatch):
+    """Answers to large changes, at a coarse step, lead astray where a wheel slides or shimmies."""
     asked = []
 
     def answers(simulator, chair, model, errors, states, share):
@@ -79,11 +79,11 @@ def test_a_step_that_fails_where_a_caster_shimmies_is_made_anew_with_small_chang
     monkeypatch.setattr(window_states, "_size", lambda *_: 9.0)
     monkeypatch.setattr(window_states, "_answers", answers)
     monkeypatch.setattr(window_states, "_step", lambda *_: (np.ones(len(SLOW)), 5.0))
-    windows = [SimpleNamespace(shimmies=k == 0) for k in range(2)]
-    simulator = SimpleNamespace(windows=windows)
+    simulator = SimpleNamespace(windows=[None, None])
     chair = SimpleNamespace(stands=lambda _: False, moved=lambda state, change: change)
     errors = SimpleNamespace(applied=lambda *_: None)
     going = {k: window_states.Search("tried", "best", 4.0) for k in range(2)}
+    going[0].promise, going[1].promise = 2.0, 0.3
     slow = ["old", "old"]
     arguments = (simulator, chair, ("fine", "coarse"), errors, going, WHITE, slow, True)
     window_states._fit_round(*arguments)

@@ -45,8 +45,10 @@ def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitte
         begin = _best_size(base, start, p, other)
         if begin is None:
             continue
+        # where it slides or shimmies, coarse derivatives lead a fit astray
+        touchy = replace(base.around.track, touchy=frozenset(_worst_windows(base)))
         try:
-            yield start, refit(base.bench, begin, base.around.track)
+            yield start, refit(base.bench, begin, touchy)
         except (MjchairError, np.linalg.LinAlgError):
             continue  # this chair cannot have it
 

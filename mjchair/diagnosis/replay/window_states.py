@@ -29,6 +29,7 @@ from mjchair.simulation.initial import position_joints, start
 Array = NDArray[np.float64]
 ROUNDS = 2  # Gauss-Newton rounds a window
 MORE = 4  # further ones, as where casters flip
+MUCH = 0.1  # of the misfit: a step that promised as much, and failed, came of wrong answers
 FINER = 0.1  # of the steps of finite differences, where a step of the fit failed
 # of misfit, in variances of the sensors' noise, that the step of a round promises
 PROMISE = 4.0  # from which answers to the slow state are made anew where it led
@@ -45,7 +46,7 @@ class Track:
       trace: qpos, qvel and act along each window, after each step. coarse: predictions at the
         coarse step, once they were needed; seen: by what sensors.
       touchy: windows whose motion answers to so small changes that derivatives need the fine step,
-        as that of a wheel that shimmies.
+        as that of a wheel that shimmies or slides.
     """
 
     states: list[State]
@@ -211,6 +212,11 @@ def _goes_on(chair: Chair, search: Search, round_: int, kept: bool) -> bool:
     return search.promise > PROMISE
 
 
+def _leads_astray(chair: Chair, search: Search) -> bool:
+    """Whether a step that failed had promised much; a chair at rest answers in steps."""
+    return search.promise > MUCH * search.size and not chair.stands(search.best)
+
+
 def _traced(
     simulator: WindowSimulator, model: mujoco.MjModel, states: dict[int, State]
 ) -> dict[int, Outcome]:
@@ -248,7 +254,7 @@ def _fit_round(
             good.append(i)
             if s.touchy or not kept:
                 asked[i] = s.best
-        elif w.shimmies and not s.touchy:
+        elif not s.touchy and _leads_astray(chair, s):
             s.touchy, s.state, asked[i] = True, s.best, s.best
             good.append(i)
         else:
