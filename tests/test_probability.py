@@ -123,8 +123,12 @@ def test_a_force_of_any_form_speaks_against_effects_only_where_they_leave_a_gap(
     assert whole > rules.PROBABLE > 0.9 > rest
 
 
-def test_a_linear_gain_that_the_fitted_chair_has_already_speaks_for_nothing():
+def test_a_linear_gain_that_the_fitted_chair_has_already_speaks_for_nothing(monkeypatch):
     """A force gains 400 by linear algebra, of which the chair without effects takes 390."""
+    ends = np.linspace(-9.0, 9.0, 50)
+    line = calibration.Line(values=tuple(ends), right=tuple(1.0 / (1.0 + np.exp(-ends))))
+    even = calibration.Calibration("", "", 0, 10.0, *[line] * len(calibration.LINES))
+    monkeypatch.setattr(calibration, "shipped", lambda: even)  # lines of the real one have steps
     made = base(2.0, force=2.0)
 
     def there():

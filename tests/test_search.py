@@ -56,6 +56,7 @@ def fits(monkeypatch):
         return tuple(SimpleNamespace(effect=s.effect) for s in hypothesis.starts)
 
     monkeypatch.setattr(search.whole_sizes, "fits", lambda *_: ())
+    monkeypatch.setattr(search.whole_sizes, "compared", lambda _, fitted: fitted)
     monkeypatch.setattr(search, "refit", refit)
     monkeypatch.setattr(search.hypotheses, "terms", terms)
     return SimpleNamespace(asked=asked, answers=answers)
@@ -63,7 +64,7 @@ def fits(monkeypatch):
 
 def searching():
     base = SimpleNamespace(
-        bench=None,
+        bench=SimpleNamespace(simulator=SimpleNamespace(windows=[])),
         nuisances={},
         plain=SimpleNamespace(total=2000.0, variant=Variant(())),
         reduced=SimpleNamespace(total=2000.0),
@@ -266,9 +267,10 @@ def test_what_is_roughly_known_hides_no_effect(fits, monkeypatch, offset, narrow
     assert (looking.base.reduced is wide) == (best == "rolling")
 
 
+@pytest.mark.parametrize("shimmies", [False, True])
 @pytest.mark.parametrize("total", [1110.0, 1600.0])
-def test_an_effect_of_a_whole_size_may_be_the_better_one(fits, monkeypatch, total):
-    """A patch of the floor stood for casters that shimmy."""
+def test_an_effect_of_a_whole_size_may_be_the_better_one(fits, monkeypatch, total, shimmies):
+    """A patch of the floor stood for casters that shimmy, and left no gap in one run."""
     fits.answers.update(
         {
             ("rolling", "as given"): fit(1500.0, "rolling"),
@@ -284,8 +286,10 @@ def test_an_effect_of_a_whole_size_may_be_the_better_one(fits, monkeypatch, tota
     here = (looking.fit(ONE), SimpleNamespace(exists=True))
     found, left = looking.or_whole(here)
     assert (found.fitted is whole and not left.exists) == (total < 1500.0)
+    monkeypatch.setattr(search.whole_sizes, "shimmies", lambda _: shimmies)
     closed = (here[0], SimpleNamespace(exists=False))
-    assert looking.or_whole(closed) is closed  # where no gap is left, none is looked for
+    stays = looking.or_whole(closed) is closed  # where nothing asks for one, none is looked for
+    assert stays == (not shimmies or total > 1500.0)
 
 
 def test_a_fit_that_cannot_come_near_the_best_is_not_started_again(fits):

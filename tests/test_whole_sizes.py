@@ -1,18 +1,20 @@
 """Fits that begin at whole sizes, with chi2 that is told instead of simulated.
 
-In: chi2 of an effect's sizes. Out: the size at which a fit begins.
+In: chi2 of an effect's sizes. Out: the size at which a fit begins, and its standard error.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from mjchair.diagnosis.explain import whole_sizes
-from mjchair.diagnosis.fit.variant import Variant
+from mjchair.diagnosis.fit.column_ids import ParameterId
+from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.effects.library import MECHANICAL, find
 from mjchair.errors import MjchairError
 
@@ -91,3 +93,57 @@ def test_whole_sizes_are_sizes_that_can_be():
     for effect in MECHANICAL:
         for p in effect.parameters:
             assert all(p.low < size < p.high and size != p.neutral for size in p.whole)
+
+
+SHIMMY = ParameterId("relaxation_length", "length")
+
+
+@dataclass
+class End:
+    """What a fit that ended at a size says."""
+
+    variant: Variant
+    total: float
+    track: object = None
+    std: dict = field(default_factory=lambda: {SHIMMY: 1e-4})
+    sigmas: dict = field(default_factory=lambda: {"relaxation_length": 900.0})
+
+
+def ended(size, total):
+    """A fit of a relaxation length (m)."""
+    term = Term(find("relaxation_length"), {"length": size}, ("length",))
+    return End(Variant((), terms=(term,)), total)
+
+
+@pytest.mark.parametrize(
+    ("ends", "size", "std"),
+    [
+        (((0.100, 3020.0), (0.100, 3020.0)), 0.100, 1e-4),  # all starts agree
+        (((0.095, 3030.0), (0.108, 3015.0)), 0.108, 0.013),  # three valleys as deep as each other
+        (((0.080, 3600.0), (0.104, 3100.0)), 0.100, 0.004),  # one is ruled out, as a rival would be
+    ],
+)
+def test_a_size_is_known_no_better_than_fits_that_began_beside_it_say(monkeypatch, ends, size, std):
+    """Shimmies end in the valley in which they began, and each is 0.1 mm wide."""
+    chosen = ended(0.100, 3020.0)
+    begun_at = []
+
+    def refit(bench, begin, track):
+        begun_at.append(begin.terms[0].values["length"])
+        return ended(*ends[len(begun_at) - 1])
+
+    monkeypatch.setattr(whole_sizes, "refit", refit)
+    base = SimpleNamespace(bench=None, plain=SimpleNamespace(total=13_000.0))
+    found = whole_sizes.compared(base, chosen)
+    assert begun_at == pytest.approx([0.09, 0.11])
+    assert found.variant.terms[0].values["length"] == size
+    assert found.std[SHIMMY] == pytest.approx(std)
+    assert found.sigmas["relaxation_length"] == pytest.approx(min(900.0, size / std))
+
+
+def test_fits_without_whole_sizes_are_not_made_again(monkeypatch):
+    monkeypatch.setattr(whole_sizes, "refit", None)
+    term = Term(find("toe"), {"symmetric": 0.01, "asymmetric": 0.0}, ("symmetric",))
+    one = replace(ended(0.1, 10.0), variant=Variant((), terms=(term,)))
+    found = whole_sizes.compared(SimpleNamespace(plain=SimpleNamespace(total=90.0)), one)
+    assert found == one

@@ -372,7 +372,12 @@ def out_of_reach(*, promised: float, best: float, gain: float) -> bool:
     Args:
       promised, best: chi2 that the fit promises, and of the best fit. gain: that the best brings.
     """
-    return promised - best > FAR_BEHIND * max(RIVAL_CHI2, FORM * gain)
+    return promised - best > FAR_BEHIND * not_ruled_out(gain=gain)
+
+
+def not_ruled_out(*, gain: float) -> float:
+    """Chi2 by which a fit may be worse and yet as good as another that brings `gain`."""
+    return max(RIVAL_CHI2, FORM * gain)
 
 
 def stays_a_rival(*, behind: float, gain: float, errors: float, beyond_bound: bool) -> bool:
@@ -384,7 +389,7 @@ def stays_a_rival(*, behind: float, gain: float, errors: float, beyond_bound: bo
         most of what the chosen brings. beyond_bound: it alone would have to be larger than it can
         be.
     """
-    near = behind < max(RIVAL_CHI2, FORM * gain)
+    near = behind < not_ruled_out(gain=gain)
     scattered = errors < RIVAL_ERRORS and behind < REPLACES * gain
     return not beyond_bound and (near or scattered)
 
@@ -395,7 +400,7 @@ def to_rule_out(*, behind: float, gain: float) -> float:
     Args:
       behind, gain: as `stays_a_rival` takes them.
     """
-    return max(max(RIVAL_CHI2, FORM * gain) - behind, RIVAL_CHI2)
+    return max(not_ruled_out(gain=gain) - behind, RIVAL_CHI2)
 
 
 def to_show_again(*, event: float, gain: float) -> float:

@@ -74,7 +74,7 @@ def without_hidden(search: Search) -> Search:
     here = _first(search)
     # small changes do not lead to an effect of a whole size: the search would not find it again
     whole = any(p.whole for s in here.starts for p in s.effect.parameters)
-    done = whole and _shimmies(base)  # what it leaves of a shimmy is no further effect
+    done = whole and whole_sizes.shimmies(base)  # what it leaves of a shimmy is no further effect
     while not done and len(here.starts) < rules.MOST and noise_shown.loudness(here.bench) > LOUD:
         further = _further(base, here)
         if further is None:
@@ -96,16 +96,11 @@ def _first(search: Search) -> Explained:
     tried = search.fit(best) if best and best.gain > rules.needed(best.free) else None
     if best and tried:
         known.append(_left(base, best.starts, search.anew(tried)))
-    if _shimmies(base) or min(noise_shown.loudness(e.bench) for e in known) > SHAKEN:
+    if whole_sizes.shimmies(base) or min(noise_shown.loudness(e.bench) for e in known) > SHAKEN:
         search.say("effects of whole sizes")
         known += [_left(base, (s,), f) for s, f in whole_sizes.fits(base)]
     first = min(known, key=attrgetter("price"))
     return _agreed(base, first) if first.starts else first
-
-
-def _shimmies(base: Base) -> bool:
-    """Whether a caster shimmies in any window."""
-    return any(w.shimmies for w in base.bench.simulator.windows)
 
 
 def _further(base: Base, here: Explained) -> Explained | None:

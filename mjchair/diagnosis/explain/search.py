@@ -64,7 +64,7 @@ def choose(base: Base, gap: Gap, say: Say, search: Search | None = None) -> Choi
         return None
     best, rivals = search.against_rivals(search.without_needless(grown[0]))
     say("the last fit, with everything made anew around it")
-    fitted = search.anew(best)
+    fitted = search.last_fit(best)
     return Choice(
         hypothesis=best.hypothesis,
         fitted=fitted,
@@ -223,12 +223,13 @@ class Search:
         return tried, gap_after(self.base, self.anew(tried))
 
     def or_whole(self, here: WithGap) -> WithGap:
-        """The single effect, or one of a whole size that is better where the first leaves a gap.
+        """The single effect, or one of a whole size that is better.
 
-        Small changes do not lead there, and what they lead to may stand in for it: a patch of the
-        floor for wheels that shimmy once.
+        These are tried where the first leaves a gap or a caster shimmies. Small changes do not lead
+        there, and what they lead to may stand in for it: a patch of the floor for wheels that
+        shimmy once.
         """
-        if not here[1].exists:
+        if not here[1].exists and not whole_sizes.shimmies(self.base):
             return here
         best = here[0]
         for start, fitted in whole_sizes.fits(self.base, self.anew(best)):
@@ -620,6 +621,10 @@ class Search:
             known = self._made_anew(first.variant, first.track, name) or first
             self.again.append(Rival(hypothesis, known))
         return known
+
+    def last_fit(self, tried: Tried) -> Fitted:
+        """The fit with everything made anew, or a better one from beside its whole sizes."""
+        return whole_sizes.compared(self.base, self.anew(tried))
 
     def _made_anew(self, start: Variant, before: Track, noted: str = "") -> Fitted | None:
         """The fit from a variant, all columns made there; None: no chair can be so.

@@ -1,7 +1,8 @@
 """Effects of a size at which a chair does what no small change foretells: it slides or shimmies.
 
-In: the screened columns. Out: fits that begin at such a size, where the size alone already brings
-more than it costs, and not far less than another explanation does.
+In: the screened columns, or a fit that was chosen. Out: fits that begin at such a size, where the
+size alone already brings more than it costs, and not far less than another explanation does; how
+far the ends of fits that begin a little beside the chosen one lie apart.
 
 Linear algebra is blind to these: a tire with a little less friction does nothing until it slides,
 and a relaxation length does little until the wheels shimmy. So the windows that disagree most are
@@ -20,14 +21,21 @@ from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted, refit
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.replay.window_states import Track, track
-from mjchair.effects.effect import Parameter
+from mjchair.effects.effect import Effect, Parameter
 from mjchair.errors import MjchairError
 
 LOOKED = 4  # windows, those that disagree most
+BESIDE = 0.1  # of a size, by which fits begin beside the one that was chosen
 BETWEEN = 2  # times that the best size is compared with the middles to its neighbours
+
+
+def shimmies(base: Base) -> bool:
+    """Whether a caster shimmies in any window."""
+    return any(w.shimmies for w in base.bench.simulator.windows)
 
 
 def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitted]]:
@@ -38,7 +46,7 @@ def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitte
     """
     seen = set()
     for start in base.starts:
-        p = next((p for p in start.effect.fitted if p.whole), None)
+        p = _parameter(start.effect)
         if p is None or start.effect.key in seen:
             continue
         seen.add(start.effect.key)
@@ -51,6 +59,53 @@ def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitte
             yield start, refit(base.bench, begin, touchy)
         except (MjchairError, np.linalg.LinAlgError):
             continue  # this chair cannot have it
+
+
+def compared(base: Base, fitted: Fitted) -> Fitted:
+    """The best of a fit and of those that begin a little beside its whole sizes.
+
+    Where a wheel slides or shimmies, chi2 has many valleys, and a fit ends in the one in which it
+    began. Ends that fit as well as a rival may say how well a size is known: its standard error is
+    at least the distance between them.
+    """
+    fits = [fitted, *_beside(base, fitted)]
+    if len(fits) == 1:
+        return fitted
+    best = min(fits, key=lambda f: f.total)
+    most = rules.not_ruled_out(gain=base.plain.total - best.total)
+    near = [f for f in fits if f.total - best.total < most]
+    std, sigmas = dict(best.std), dict(best.sigmas)
+    for k, term in enumerate(best.variant.terms):
+        p = _parameter(term.effect)
+        if p is None or p.name not in term.free:
+            continue
+        sizes = [f.variant.terms[k].values[p.name] for f in near]
+        key = ParameterId(term.effect.key, p.name)
+        std[key] = max(std[key], max(sizes) - min(sizes))
+        away = abs(term.values[p.name] - p.neutral) / std[key]
+        sigmas[term.effect.key] = min(sigmas[term.effect.key], away)
+    return replace(best, std=std, sigmas=sigmas)
+
+
+def _beside(base: Base, fitted: Fitted) -> Iterator[Fitted]:
+    """Fits that begin at sizes a little smaller and larger than a fit has; those that can be."""
+    terms = fitted.variant.terms
+    for k, term in enumerate(terms):
+        p = _parameter(term.effect)
+        if p is None or p.name not in term.free:
+            continue
+        for share in (1.0 - BESIDE, 1.0 + BESIDE):
+            moved = replace(term, values={**term.values, p.name: share * term.values[p.name]})
+            begin = replace(fitted.variant, terms=(*terms[:k], moved, *terms[k + 1 :]))
+            try:
+                yield refit(base.bench, begin, fitted.track)
+            except (MjchairError, np.linalg.LinAlgError):
+                continue  # this chair cannot have it
+
+
+def _parameter(effect: Effect) -> Parameter | None:
+    """The parameter of an effect that has whole sizes; None: it has none."""
+    return next((p for p in effect.fitted if p.whole), None)
 
 
 def _best_size(
