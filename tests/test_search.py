@@ -23,7 +23,7 @@ def effect(name):
     return SimpleNamespace(effect=SimpleNamespace(key=name, common=1.0), free=("size",))
 
 
-ROLLING, MOTOR = effect("rolling"), effect("motor")
+ROLLING, MOTOR, WIND = effect("rolling"), effect("motor"), effect("wind")
 ONE = Hypothesis((ROLLING,), gain=500.0, score=490.0)
 BOTH = Hypothesis((ROLLING, MOTOR), gain=900.0, score=880.0)
 
@@ -227,6 +227,28 @@ def test_a_single_effect_may_be_what_the_search_for_noise_left_over(fits, monkey
     looking.base.best = SimpleNamespace(starts=(ROLLING, MOTOR), fitted=both)
     best, left = search._grown(looking)
     assert best.hypothesis.keys == ("motor",) and best.fitted is motor and not left.exists
+
+
+def test_a_pair_that_was_fitted_while_the_noise_was_sought_may_be_the_better_one(fits, monkeypatch):
+    """A wind stood in for slope and toe; what fits worse beside it leaves no gap either."""
+    pair = Hypothesis((MOTOR, WIND), gain=900.0, score=880.0)
+    fits.answers.update(
+        {
+            ("rolling", "as given"): fit(1500.0, "rolling"),
+            ("rolling", "track of rolling"): fit(1500.0, "rolling"),
+            ("motor+wind", "track of motor+wind"): fit(1105.0, "motor", "wind"),
+        }
+    )
+    worse = search.Tried(BOTH, fit(1600.0, "rolling", "motor"))
+    monkeypatch.setattr(search.hypotheses, "weigh", lambda _, starts: pair)
+    monkeypatch.setattr(search.Search, "beside", lambda *_: (worse, SimpleNamespace(exists=False)))
+    monkeypatch.setattr(search, "believable", lambda _: True)
+    monkeypatch.setattr(search, "gap_after", lambda *_: SimpleNamespace(exists=False))
+    looking = searching()
+    looking.base.best = SimpleNamespace(starts=pair.starts, fitted=fit(1105.0, "motor", "wind"))
+    first = looking.fit(ONE)
+    found, left = looking.further(first, 2)
+    assert found.hypothesis is pair and found.fitted.total == 1105.0 and not left.exists
 
 
 @pytest.mark.parametrize(

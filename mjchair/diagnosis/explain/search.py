@@ -100,6 +100,14 @@ def _grown(search: Search) -> WithGap | None:
     return here
 
 
+def _closes(more: WithGap | None, best: Tried) -> bool:
+    """Whether a larger hypothesis is better than the best and leaves no gap.
+
+    One that is worse may leave none as well, by what its own next step promises.
+    """
+    return more is not None and not more[1].exists and more[0].price < best.price
+
+
 def _better(one: WithGap | None, other: WithGap | None) -> WithGap | None:
     """The one with the lower price; None: there is neither."""
     return min((t for t in (one, other) if t is not None), key=lambda t: t[0].price, default=None)
@@ -168,10 +176,25 @@ class Search:
         if best is not None and self.near is not None:
             return self.best_of(self._promising(best), patient=False)
         top = None if best is None else self.beside(best)
-        if top is not None and not top[1].exists:
+        if best is not None and not _closes(top, best):
+            top = _better(top, self._fitted_before(size))
+        if best is not None and _closes(top, best):
             return top
         # perhaps the first effect stands in for two others
         return _better(top, self.best_of(self.options(size), patient=best is None))
+
+    def _fitted_before(self, size: int) -> WithGap | None:
+        """What was best while the noise was sought, if of so many effects, and the gap it leaves.
+
+        The first effect may stand in for two others, whose fit is at hand.
+        """
+        known = self.base.best
+        if known is None or len(known.starts) != size:
+            return None
+        every = self.weigh(known.starts)
+        self._begin_at(every, known.fitted)
+        tried = self.believed(every)
+        return None if tried is None else (tried, gap_after(self.base, tried.fitted))
 
     def settled(self, here: WithGap) -> WithGap:
         """A fit with the gap that it leaves once everything is made anew around it.
