@@ -36,6 +36,7 @@ def fit(total, *keys, promised=None):
         variant=Variant((), terms=terms),
         track=f"track of {'+'.join(sorted(keys))}",
         sigmas=dict.fromkeys(keys, 3.0),
+        at_bound=(),
     )
 
 
@@ -367,6 +368,28 @@ def test_where_no_second_effect_stands_no_third_is_tried(fits, monkeypatch):
     chosen = search.choose(base, SimpleNamespace(exists=True), lambda line: None)
     assert chosen.hypothesis is ONE
     assert "motor+rolling+scrub" not in {keys for keys, _ in fits.asked}
+
+
+@pytest.mark.parametrize("total", [1005.0, 1490.0])
+def test_beyond_a_pair_that_ends_on_a_bound_one_more_is_tried(fits, monkeypatch, total):
+    """A gain of the rims pushed the mass that moves to its bound; without a bound none is tried."""
+    third = search.Tried(
+        Hypothesis((ROLLING, MOTOR, WIND), gain=950.0, score=920.0),
+        fit(total, "rolling", "motor", "wind"),
+    )
+    fits.answers[("rolling", "as given")] = fit(1500.0, "rolling")
+    fits.answers[("rolling", "track of rolling")] = fit(1500.0, "rolling")
+    fits.answers[("motor+rolling", "as given")] = fit(1110.0, "rolling", "motor")
+    left = SimpleNamespace(exists=False)
+    monkeypatch.setattr(search.Search, "beside", lambda *_: (third, left))
+    monkeypatch.setattr(search.Search, "is_worth", lambda _, a, b: b.price < a.price)
+    looking = searching()
+    here = (looking.fit(ONE), SimpleNamespace(exists=True))
+    pair = looking.fit(BOTH)
+    assert looking.beyond_bound(here, 2) is None
+    pair.fitted.at_bound = ("mass",)
+    assert (looking.beyond_bound(here, 2) == (third, left)) == (total < 1400.0)
+    assert looking.beyond_bound(here, 3) is None
 
 
 @pytest.mark.parametrize(("worse", "stays"), [(60.0, True), (200.0, False)])

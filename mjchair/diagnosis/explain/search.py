@@ -93,6 +93,9 @@ def _grown(search: Search) -> WithGap | None:
         if more is None and here is None:
             continue
         if more is None or (here is not None and not search.is_worth(here[0], more[0])):
+            more = search.beyond_bound(here, size) if here is not None else None
+            size += 1
+        if more is None:
             break  # where no second effect stands beside the first, no third does
         here = search.settled(more)
         if size == 1:
@@ -182,6 +185,27 @@ class Search:
             return top
         # perhaps the first effect stands in for two others
         return _better(top, self.best_of(self.options(size), patient=best is None))
+
+    def beyond_bound(self, here: WithGap, size: int) -> WithGap | None:
+        """The best hypothesis of so many effects, with one more, where a size of it is on a bound.
+
+        Two rims of different gain pushed the mass that moves on a chair to its bound.
+
+        Args:
+          here: the best so far, of fewer effects, to which the larger one must be worth adding.
+        """
+        bound = [
+            t
+            for t in self.tried
+            if len(t.hypothesis.starts) == size < rules.MOST
+            and t.fitted.total < here[0].fitted.total
+            and t.fitted.at_bound
+        ]
+        if not bound:
+            return None
+        best = min(bound, key=lambda t: t.fitted.total)
+        more = self.beside(Tried(best.hypothesis, best.fitted))
+        return more if more is not None and self.is_worth(here[0], more[0]) else None
 
     def _fitted_before(self, size: int) -> WithGap | None:
         """What was best while the noise was sought, if of so many effects, and the gap it leaves.
