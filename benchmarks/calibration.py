@@ -80,9 +80,7 @@ def _drawn(line: dict[str, Any]) -> Drawn:
     if line["chosen"]:
         rivals = line["rivals"]  # a count, or the names for each effect
         there = any(rivals) if isinstance(rivals, list) else rivals > 0
-        sigmas = line["sigmas"]  # the least, or of each effect
-        least = min(sigmas.values()) if isinstance(sigmas, dict) else sigmas
-        chosen = Chosen(line["chosen"], line["gap_left"], there, least)
+        chosen = Chosen(line["chosen"], line["gap_left"], there, line["sigmas"])
     return Drawn(
         study=line["study"],
         truth=line["truth"] if "truth" in line else _truth(line["answer"]),

@@ -43,6 +43,7 @@ from mjchair.diagnosis.explain.probability import (
     PRIOR_NONE,
     PRIOR_OUTSIDE,
     PRIOR_TWO,
+    least_certain,
     weights,
 )
 from mjchair.diagnosis.fit import bounded
@@ -539,7 +540,7 @@ def diagnosed(bed: Bed, y: Sequence[Array]) -> dict[str, Any]:
         line |= {
             "gap_left": choice.after.exists,
             "rivals": sum(len(group) for group in choice.rivals),
-            "sigmas": min(choice.fitted.sigmas.values()),
+            "sigmas": least_certain(choice),
         }
     return line
 

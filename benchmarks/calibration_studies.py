@@ -36,7 +36,7 @@ from mjchair.diagnosis.diagnose import study_effects
 from mjchair.diagnosis.explain import missing_force
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import closure
-from mjchair.diagnosis.explain.probability import OUTSIDE, weights
+from mjchair.diagnosis.explain.probability import OUTSIDE, least_certain, weights
 from mjchair.diagnosis.explain.screening import Base, gap_after, prepare, screen_columns
 from mjchair.diagnosis.explain.search import choose
 from mjchair.diagnosis.fit.column_ids import ColumnId
@@ -363,7 +363,7 @@ def one(made: Made, out: Path, known: bool = False) -> dict:
             "gap_left": choice.after.exists,
             "rivals": [[r.hypothesis.keys for r in group] for group in choice.rivals],
             "closure": closure(gap, base, choice.fitted, choice.after),
-            "sigmas": choice.fitted.sigmas,
+            "sigmas": least_certain(choice),
         }
     return line
 

@@ -92,7 +92,18 @@ def chosen(known, name, rivals=(), gap_left=False):
         tried=list(fits.values()),
         after=SimpleNamespace(exists=gap_left),
         rivals=[[fits[r] for r in rivals]],
+        own_gains=[fits[name].hypothesis.gain],
     )
+
+
+def test_a_choice_is_as_sure_as_its_least_certain_effect():
+    made = base(2.0)
+    choice = chosen(made, "rolling_resistance")
+    choice.fitted.sigmas["rolling_resistance"] = 3.0  # a standard error as wide as a prior
+    sure = of_effects(probabilities(made, choice), ["rolling_resistance"])
+    choice.own_gains.append(9.0)
+    less = of_effects(probabilities(made, choice), ["rolling_resistance"])
+    assert sure > rules.PROBABLE > 0.9 > less
 
 
 @pytest.mark.parametrize("size", [0.0, 0.3, 2.0])

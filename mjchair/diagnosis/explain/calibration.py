@@ -7,9 +7,9 @@ divided by a temper, since no form of an effect is quite that of a real chair. T
 the chosen effects are there are replaced by how often they were there in the cheap studies at such
 odds, a line that never falls (isotonic regression), with one line for choices that leave a gap and
 one for those with rivals. Effects that leave no gap and have no rival are read off by the standard
-errors of the least certain of them: there the rivals are ruled out, and how large an effect is told
-right from wrong as well as all odds together. What is left of the probability goes to the other
-hypotheses.
+errors of the least certain of them (the root of the chi2 that it brings): there the rivals are
+ruled out, and how large an effect is told right from wrong as well as all odds together. What is
+left of the probability goes to the other hypotheses.
 """
 
 from __future__ import annotations
@@ -55,7 +55,8 @@ class Chosen:
 
     Attributes:
       name: of it. gap_left: whether it leaves a gap. rivals: whether something could stand in it.
-      sigmas: of the least certain effect, standard errors away from no effect.
+      sigmas: standard errors away from no effect, of the least certain one: the root of the chi2
+        that it brings beside the others.
     """
 
     name: str
