@@ -510,6 +510,7 @@ def linear() -> Iterator[None]:
     with (
         mock.patch.object(search, "Search", LinearSearch),
         mock.patch.object(search, "gap_after", _gap_after),
+        mock.patch.object(search, "confirmed", lambda _base, _fitted, gap: gap),
         mock.patch.object(gaps, "DRAWS", DRAWS),
         mock.patch.object(gaps, "stats", quick),
         mock.patch.object(gaps, "_cell_tests", lambda *_: []),

@@ -48,6 +48,7 @@ SHORT = 0.1  # share of the promise of the linear fit: a fit that misses more st
 # the gap
 LEVEL = 0.01  # of the whole family of tests
 LEAST = 5.0  # standard deviations below which a null made elsewhere shows gaps as well
+CLEAR = 20.0  # standard deviations beyond which no null is asked for (assumption)
 # of the gain of all: columns that are made anew, again and again around one fit, change its chi2 by
 # as much (53 of 331 000 was seen), so a test that shows less shows nothing
 ROUNDING = 2e-4
@@ -115,6 +116,15 @@ def gap_exists(p: float, sigmas: float, gain: float = 0.0) -> bool:
         which are in already.
     """
     return p < LEVEL and sigmas > max(LEAST, math.sqrt(ROUNDING * max(gain, 0.0)))
+
+
+def may_be_of_the_null(sigmas: float) -> bool:
+    """Whether a gap may be what a chair that lacks nothing shows, computed otherwise.
+
+    Args:
+      sigmas: of the largest test.
+    """
+    return sigmas < CLEAR
 
 
 def verdict(gap: bool, choice: Standing | None) -> Verdict:

@@ -9,7 +9,7 @@ the tests have (max-T), at 1 % for the family.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,6 +44,9 @@ class Cell:
     last: float
 
 
+Subject = Cell | Group
+
+
 @dataclass(frozen=True)
 class Test:
     """One test of whether anything is left.
@@ -54,7 +57,7 @@ class Test:
         deviate.
     """
 
-    subject: Cell | Group
+    subject: Subject
     statistic: float
     dof: float
     p: float
@@ -103,6 +106,7 @@ def test_gap(
     windows: Sequence[int],
     skip: Sequence[str] = (),
     gain: float = 0.0,
+    null: Mapping[Subject, float] | None = None,
     seed: int = 0,
 ) -> Gap:
     """Test what is left.
@@ -111,7 +115,9 @@ def test_gap(
       system: with everything that is accepted eliminated. windows: that are tested.
       skip: effects that are in already.
       gain: chi2 that these bring.
+      null: statistics that a chair shows which lacks nothing, by their subjects; None: only noise.
     """
+    null = null or {}
     reduced = bounded.reduce(system, windows)
     tested = {
         group: which
@@ -119,9 +125,9 @@ def test_gap(
         if not (isinstance(group, EffectGroup) and group.effect in skip)
         and _visible(reduced, which)
     }
-    tests = [_test(group, *whole(reduced, which)) for group, which in tested.items()]
+    tests = [_test(group, *whole(reduced, which), null) for group, which in tested.items()]
     family = _family(reduced, list(tested.values()), tests, seed) if tests else 1.0
-    cells = _cell_tests(bench, system, windows)
+    cells = _cell_tests(bench, system, windows, null)
     worst = min((t.p for t in cells), default=1.0)
     p = min(1.0, 2.0 * min(family, 1.0 - (1.0 - worst) ** max(len(cells), 1)))
     sigmas = max((t.sigmas for t in (*tests, *cells)), default=0.0)
@@ -148,7 +154,9 @@ def _visible(reduced: Reduced, which: Sequence[int]) -> bool:
     return bool((np.diag(reduced.G)[list(which)] > 1e-6).any())
 
 
-def _test(subject: Cell | Group, statistic: float, dof: float) -> Test:
+def _test(subject: Subject, statistic: float, dof: float, null: Mapping[Subject, float]) -> Test:
+    """A test, once what its null shows is taken off: at most the roots of both add up."""
+    statistic = max(np.sqrt(statistic) - np.sqrt(null.get(subject, 0.0)), 0.0) ** 2
     p = float(stats.chi2.sf(statistic, max(dof, 1.0)))
     sigmas = float(stats.norm.isf(max(p, 1e-300) / 2.0)) if p < 1.0 else 0.0
     if p < 1e-290:
@@ -181,7 +189,9 @@ def _family(
     return float(min(1.0 / DRAWS, effective * smallest))
 
 
-def _cell_tests(bench: Bench, system: System, windows: Sequence[int]) -> list[Test]:
+def _cell_tests(
+    bench: Bench, system: System, windows: Sequence[int], null: Mapping[Subject, float]
+) -> list[Test]:
     out = []
     channels = bench.simulator.channels
     for i in windows:
@@ -191,5 +201,5 @@ def _cell_tests(bench: Bench, system: System, windows: Sequence[int]) -> list[Te
             dof = system.cells[i].dof[k]
             if dof >= 1.0:
                 cell = Cell(channel, name, w.first, w.last)
-                out.append(_test(cell, system.cells[i].chi2[k], dof))
+                out.append(_test(cell, system.cells[i].chi2[k], dof, null))
     return out

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain.gap import Gap
+from mjchair.diagnosis.explain.null_ensemble import confirmed
 from mjchair.diagnosis.explain.screening import Base, gap_after
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
@@ -121,6 +122,7 @@ def plain_gap(base: Base) -> Gap:
 
     What is only roughly known may take an effect for itself, and then foretells wrongly.
     """
-    gap, held = gap_after(base, base.plain), on_held_out(base, base.plain)
+    gap = confirmed(base, base.plain, gap_after(base, base.plain))
+    held = on_held_out(base, base.plain)
     foretold = held is None or not rules.foretells_wrongly(held)
     return gap if foretold else replace(gap, exists=True)

@@ -5,7 +5,7 @@ In: a study and effects. Out: a `Base`, on which everything after it rests.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from mjchair.diagnosis.data.windows import calm
 from mjchair.diagnosis.explain import candidates, hypotheses, missing_force, noise_shown
 from mjchair.diagnosis.explain import gap as gaps
 from mjchair.diagnosis.explain.candidates import Around, Start
-from mjchair.diagnosis.explain.gap import Gap
+from mjchair.diagnosis.explain.gap import Gap, Subject
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
@@ -235,15 +235,18 @@ def system_around(base: Base, bench: Bench, fitted: Fitted) -> System:
     return bench.system(fitted.track, columns, count, fitted.variant, free=free)
 
 
-def gap_after(base: Base, fitted: Fitted) -> Gap:
+def gap_after(base: Base, fitted: Fitted, null: Mapping[Subject, float] | None = None) -> Gap:
     """Test what a fit leaves, with its own parameters free.
 
     A caster that shimmies hangs on so little that no fit leaves noise alone there. Once an effect
     is in that makes it shimmy, only the other windows tell of what is missing besides.
+
+    Args:
+      null: statistics that a chair shows which lacks nothing; None: only noise.
     """
     bench, terms = base.bench, fitted.variant.terms
     system = system_around(base, bench, fitted)
     made = any(p.whole for term in terms for _, p in term.parameters)
     windows = calm(bench.simulator.windows, bench.windows) if made else bench.windows.tolist()
     gain = base.plain.total - fitted.total
-    return gaps.test_gap(bench, system, windows, [t.effect.key for t in terms], gain)
+    return gaps.test_gap(bench, system, windows, [t.effect.key for t in terms], gain, null)

@@ -21,6 +21,7 @@ from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.left_out import held_out, with_terms
 from mjchair.diagnosis.explain.near_fit import NearFit, near_fit
+from mjchair.diagnosis.explain.null_ensemble import confirmed
 from mjchair.diagnosis.explain.screening import FAR, Base, Found, Say, gap_after
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
@@ -68,7 +69,7 @@ def choose(base: Base, gap: Gap, say: Say, search: Search | None = None) -> Choi
     return Choice(
         hypothesis=best.hypothesis,
         fitted=fitted,
-        after=gap_after(base, fitted),
+        after=confirmed(base, fitted, gap_after(base, fitted)),
         rivals=rivals,
         own_gains=[search.own_gain(best, start) for start in best.hypothesis.starts],
         tried=search.tried,
