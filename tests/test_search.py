@@ -357,6 +357,7 @@ def test_where_no_second_effect_stands_no_third_is_tried(fits, monkeypatch):
     monkeypatch.setattr(search.hypotheses, "pairs", lambda *_: [BOTH])
     monkeypatch.setattr(search.hypotheses, "grown", lambda *_: [third])
     monkeypatch.setattr(search, "gap_after", lambda *_: SimpleNamespace(exists=True))
+    monkeypatch.setattr(search, "confirmed", lambda _base, _fitted, gap: gap)
     monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
     monkeypatch.setattr(search, "believable", lambda f: len(f.variant.terms) == 1)
     monkeypatch.setattr(search, "_replacements", lambda *_: [])
