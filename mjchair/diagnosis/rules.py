@@ -376,6 +376,15 @@ def is_stuck(*, total: float, promised: float) -> bool:
     return total - promised > RIVAL_CHI2
 
 
+def reaches(*, total: float, promised: float, gain: float) -> bool:
+    """Whether a fit gets to what its own linear step promises, as near as a rival must come.
+
+    Args:
+      gain: chi2 that it brings.
+    """
+    return total - promised <= not_ruled_out(gain=gain)
+
+
 def out_of_reach(*, promised: float, best: float, gain: float) -> bool:
     """Whether a fit is not worth starting again: even what it promises is far behind.
 

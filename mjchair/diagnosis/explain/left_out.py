@@ -86,14 +86,20 @@ def _shown(size: Array, there: NDArray[np.bool_]) -> bool:
     return bool((size[there].sum(axis=0) >= ALONE * size.sum(axis=0)).all())
 
 
-def with_terms(fitted: Fitted) -> tuple[System, list[int]]:
-    """The system of a fit, and the columns of its effects."""
+def with_terms(base: Base, fitted: Fitted) -> tuple[System, list[int]]:
+    """The system of a fit, and the columns of its effects; none where these are stuck.
+
+    A fit that does not get to what its own step promises is judged as it is.
+    """
+    gain = base.plain.total - fitted.total
+    if not rules.reaches(total=fitted.total, promised=fitted.promised, gain=gain):
+        return fitted.system, []
     return fitted.system, list(range(fitted.system.nuisance, len(fitted.system.columns)))
 
 
 def held_out_gain(base: Base, fitted: Fitted, by: str = "run") -> float:
     """What a fit brings on the parts that it did not see, in chi2."""
-    return held_out(base.bench, (base.plain.system, []), with_terms(fitted), by)
+    return held_out(base.bench, (base.plain.system, []), with_terms(base, fitted), by)
 
 
 def on_held_out(base: Base, fitted: Fitted) -> rules.HeldOut | None:

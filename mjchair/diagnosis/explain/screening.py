@@ -239,14 +239,21 @@ def gap_after(base: Base, fitted: Fitted, null: Mapping[Subject, float] | None =
     """Test what a fit leaves, with its own parameters free.
 
     A caster that shimmies hangs on so little that no fit leaves noise alone there. Once an effect
-    is in that makes it shimmy, only the other windows tell of what is missing besides.
+    is in that makes it shimmy, only the other windows tell of what is missing besides. Where a fit
+    ended far above what its own step promises, its parameters do not get there, and are held: a
+    slope and a toe together were laid to a wind, of a size that no wind can have.
 
     Args:
       null: statistics that a chair shows which lacks nothing; None: only noise.
     """
     bench, terms = base.bench, fitted.variant.terms
-    system = system_around(base, bench, fitted)
+    gain = base.plain.total - fitted.total
+    if rules.reaches(total=fitted.total, promised=fitted.promised, gain=gain):
+        system = system_around(base, bench, fitted)
+    else:
+        nuisances = nuisances_of(base, fitted)
+        every = {**nuisances, **base.columns}
+        system = bench.system(fitted.track, every, len(nuisances), fitted.variant)
     made = any(p.whole for term in terms for _, p in term.parameters)
     windows = calm(bench.simulator.windows, bench.windows) if made else bench.windows.tolist()
-    gain = base.plain.total - fitted.total
     return gaps.test_gap(bench, system, windows, [t.effect.key for t in terms], gain, null)

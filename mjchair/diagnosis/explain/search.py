@@ -395,7 +395,8 @@ class Search:
     def is_worth(self, best: Tried, more: Tried) -> bool:
         """Whether a larger hypothesis brings enough; both with everything made anew."""
         one, other = self.anew(best), self.anew(more)
-        held = held_out(self.base.bench, with_terms(one), with_terms(other))
+        fewer, full = with_terms(self.base, one), with_terms(self.base, other)
+        held = held_out(self.base.bench, fewer, full)
         return rules.worth_adding(
             gained=one.total - other.total,
             parameters=more.hypothesis.free - best.hypothesis.free,
