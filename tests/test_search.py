@@ -58,6 +58,7 @@ def fits(monkeypatch):
 
     monkeypatch.setattr(search.whole_sizes, "fits", lambda *_: ())
     monkeypatch.setattr(search.whole_sizes, "compared", lambda _, fitted: fitted)
+    monkeypatch.setattr(search.open_ended, "with_least_sizes", lambda _, fitted: fitted)
     monkeypatch.setattr(search, "refit", refit)
     monkeypatch.setattr(search.hypotheses, "terms", terms)
     return SimpleNamespace(asked=asked, answers=answers)

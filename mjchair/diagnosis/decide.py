@@ -229,6 +229,7 @@ def _named(fitted: Fitted, closed: float) -> list[NamedEffect]:
                 value=float(term.values[p.name]),
                 std=fitted.std.get(ParameterId(term.effect.key, p.name)),
                 unit=p.unit,
+                at_least=fitted.at_least.get(ParameterId(term.effect.key, p.name)),
             )
             for p in term.effect.parameters
         }

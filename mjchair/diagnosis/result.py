@@ -30,11 +30,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """A fitted number, its standard deviation (None: it was held), and their unit."""
+    """A fitted number, its standard deviation (None: it was held), and their unit.
+
+    at_least: the least size that the data allow, where far larger ones fit as well; else None.
+    """
 
     value: float
     std: float | None
     unit: str
+    at_least: float | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in diagnosis.json."""
+        known = asdict(self)
+        if self.at_least is None:
+            del known["at_least"]
+        return known
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +66,7 @@ class NamedEffect:
         """As in diagnosis.json."""
         out: dict[str, Any] = {
             "name": self.name,
-            "parameters": {name: asdict(p) for name, p in self.parameters.items()},
+            "parameters": {name: p.to_dict() for name, p in self.parameters.items()},
             "closure": round(self.closure, 4),
         }
         return {**out, "channel": self.channel} if self.channel else out

@@ -257,7 +257,8 @@ def effect_words(effect: NamedEffect) -> str:
 def _parameters(effect: NamedEffect) -> Iterable[str]:
     for name, p in effect.parameters.items():
         unit = "" if p.unit == "1" else f" {p.unit}"
-        yield f"{plain_name(name)} {with_error(p.value, p.std)}{unit}"
+        size = with_error(p.value, p.std) if p.at_least is None else f"at least {p.at_least:.2g}"
+        yield f"{plain_name(name)} {size}{unit}"
 
 
 def with_error(value: float, std: float | None) -> str:

@@ -14,7 +14,7 @@ from operator import attrgetter
 import numpy as np
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import hypotheses, whole_sizes
+from mjchair.diagnosis.explain import hypotheses, open_ended, whole_sizes
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Choice, Rival, gain, is_there
 from mjchair.diagnosis.explain.gap import Gap
@@ -672,8 +672,12 @@ class Search:
         return known
 
     def last_fit(self, tried: Tried) -> Fitted:
-        """The fit with everything made anew, or a better one from beside its whole sizes."""
-        return whole_sizes.compared(self.base, self.anew(tried))
+        """The fit with everything made anew, or a better one from beside its whole sizes.
+
+        Sizes that are open upwards have a least one.
+        """
+        fitted = whole_sizes.compared(self.base, self.anew(tried))
+        return open_ended.with_least_sizes(self.base, fitted)
 
     def _made_anew(self, start: Variant, before: Track, noted: str = "") -> Fitted | None:
         """The fit from a variant, all columns made there; None: no chair can be so.

@@ -13,7 +13,7 @@ neither converges.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,7 @@ class Fitted:
       promised: total after one more linear step. std: parameter -> standard deviation, SI.
       sigmas: effect key -> how far its parameters together are from neutral, in standard errors.
       at_bound: parameters that ended on a bound.
+      at_least: parameter -> least size, where far larger ones fit as well.
     """
 
     variant: Variant
@@ -63,6 +64,7 @@ class Fitted:
     std: dict[ParameterId, float]
     sigmas: dict[str, float]
     at_bound: tuple[ParameterId, ...]
+    at_least: dict[ParameterId, float] = field(default_factory=dict)
 
 
 def refit(

@@ -1,0 +1,92 @@
+"""A size beyond which nothing changes has a least one; chi2 is told instead of simulated."""
+
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+
+import pytest
+
+from mjchair.diagnosis.explain import open_ended
+from mjchair.diagnosis.fit.column_ids import ParameterId
+from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.diagnosis.result import Estimate
+from mjchair.effects.library import find
+from mjchair.errors import MjchairError
+
+MOMENT = ParameterId("caster_friction", "moment")
+PLAIN = 8000.0
+
+
+@dataclass
+class End:
+    """What a fit says that ended with a caster's friction (N m)."""
+
+    variant: Variant
+    total: float
+    promised: float
+    track: object = None
+    std: dict = field(default_factory=lambda: {MOMENT: 0.03})
+    at_least: dict = field(default_factory=dict)
+
+
+def ended(moment, total, promised=None):
+    term = Term(find("caster_friction"), {"moment": moment}, ("moment",))
+    return End(Variant((), terms=(term,)), total, total if promised is None else promised)
+
+
+def looked(monkeypatch, chi2, size=0.5):
+    """What is found where an effect held at a size leaves `chi2`, and the sizes held."""
+    held = []
+
+    def refit(bench, begin, track, nuisances, rounds=None):
+        assert begin.terms[0].free == ()
+        moment = begin.terms[0].values["moment"]
+        held.append(moment)
+        return ended(moment, chi2(moment))
+
+    monkeypatch.setattr(open_ended, "refit", refit)
+    monkeypatch.setattr(open_ended, "nuisances_of", lambda *_: {})
+    base = SimpleNamespace(bench=None, plain=SimpleNamespace(total=PLAIN))
+    return open_ended.with_least_sizes(base, ended(size, chi2(size))), held
+
+
+def test_a_stuck_caster_has_at_least_the_friction_at_which_it_sticks(monkeypatch):
+    found, _ = looked(monkeypatch, lambda moment: 3000.0 if moment > 0.36 else PLAIN)
+    assert found.at_least[MOMENT] == pytest.approx(0.36, abs=0.5 / 2**open_ended.HALVINGS)
+    assert found.at_least[MOMENT] > 0.36
+    # the error reaches to what was looked at
+    assert found.std[MOMENT] == pytest.approx((open_ended.FURTHER - 1.0) * 0.5)
+
+
+def test_a_size_that_data_tell_is_left_alone_after_one_look(monkeypatch):
+    found, held = looked(monkeypatch, lambda moment: 3000.0 + 1e4 * (moment - 0.5) ** 2)
+    assert found.at_least == {} and found.std == {MOMENT: 0.03}
+    assert held == [open_ended.FURTHER * 0.5]
+
+
+def test_a_bound_ends_the_look(monkeypatch):
+    _, held = looked(monkeypatch, lambda moment: 3000.0 if moment < 9.0 else PLAIN, size=4.0)
+    assert held == [10.0]  # the largest that a caster's friction may be
+
+
+def test_what_no_chair_can_have_does_not_fit(monkeypatch):
+    def refuse(moment):
+        if moment > 0.5:
+            raise MjchairError("an effect does not compile")
+        return 3000.0
+
+    found, _ = looked(monkeypatch, refuse)
+    assert found.at_least == {}
+
+
+def test_a_size_in_two_directions_is_not_looked_at(monkeypatch):
+    monkeypatch.setattr(open_ended, "refit", None)
+    term = Term(find("floor_slope"), {"x": 0.01, "y": 0.0}, ("x",))
+    one = End(Variant((), terms=(term,)), 3000.0, 3000.0)
+    assert open_ended.with_least_sizes(SimpleNamespace(), one) is one
+
+
+def test_diagnosis_json_has_it_only_where_there_is_one():
+    told = Estimate(value=0.5, std=0.03, unit="N m")
+    assert set(told.to_dict()) == {"value", "std", "unit"}
+    stuck = Estimate(value=0.5, std=3.5, unit="N m", at_least=0.36)
+    assert stuck.to_dict()["at_least"] == 0.36
