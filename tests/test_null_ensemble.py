@@ -86,3 +86,12 @@ def test_members_are_the_same_chair():
     again = copy.copy(model)
     again.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER  # another one has no counterpart
     assert len(list(null_ensemble._computed_otherwise(again))) == 1
+
+
+def test_a_member_that_does_not_simulate_says_nothing(base, monkeypatch):
+    gap = gap_after(base, base.plain)
+    monkeypatch.setattr(rules, "CLEAR", gap.tests[0].sigmas + 1.0)
+    lost = [np.full_like(seen, np.nan) for seen in base.plain.track.predicted]
+    monkeypatch.setattr(null_ensemble, "_answers", lambda *_: [lost])
+    same = null_ensemble.confirmed(base, base.plain, gap)
+    assert same.exists and same.tests[0].sigmas == gap.tests[0].sigmas

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from mjchair.diagnosis.explain import open_ended
@@ -68,10 +69,11 @@ def test_a_bound_ends_the_look(monkeypatch):
     assert held == [10.0]  # the largest that a caster's friction may be
 
 
-def test_what_no_chair_can_have_does_not_fit(monkeypatch):
+@pytest.mark.parametrize("error", [MjchairError("does not compile"), np.linalg.LinAlgError()])
+def test_what_no_chair_can_have_does_not_fit(monkeypatch, error):
     def refuse(moment):
         if moment > 0.5:
-            raise MjchairError("an effect does not compile")
+            raise error
         return 3000.0
 
     found, _ = looked(monkeypatch, refuse)

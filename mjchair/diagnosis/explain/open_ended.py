@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain.screening import Base, nuisances_of
 from mjchair.diagnosis.fit.column_ids import ParameterId
@@ -69,6 +71,6 @@ def _fits(base: Base, fitted: Fitted, term: Term, p: Parameter, size: float) -> 
         if there.promised > most:
             return False
         there = refit(base.bench, start, there.track, nuisances)
-    except MjchairError:
+    except (MjchairError, np.linalg.LinAlgError):
         return False  # this chair cannot have it
     return there.total < most
