@@ -1,12 +1,14 @@
 """Every shipped chair keeps the contract, and bad models are refused in one line."""
 
 import math
+import warnings
 
 import mujoco
 import numpy as np
 import pytest
 
 import mjchair
+from mjchair.effects.library import find
 from mjchair.model import assets
 from mjchair.model.wheels import WHEELS, check_timestep, springs, wheels
 
@@ -117,6 +119,16 @@ def test_a_step_beyond_the_stability_limit_is_refused():
     model.opt.timestep = 0.9 * limit
     check_timestep(model)
     assert limit > 0.004
+
+
+def test_a_tire_without_relaxation_is_refused_in_one_line():
+    """NumPy's warnings came to the terminal, and "use at most nan s"."""
+    spec = mjchair.load_spec()
+    find("relaxation_length").apply(spec, {"length": -0.03})  # all that a caster's tire has
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(mjchair.MjchairError, match=r"caster's tire across; use at most 0 s"):
+            check_timestep(spec.compile())
 
 
 def without(name):

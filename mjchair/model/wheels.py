@@ -6,6 +6,7 @@ MjSpec with a tire on its wheel, or an error that says what is missing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -160,10 +161,14 @@ class Spring:
 
     def number(self, h: float) -> float:
         """k h^2 / m + 2 c h / m at the time step `h` (s)."""
+        if math.isinf(self.stiffness):  # whatever its damping
+            return math.inf
         return (self.stiffness * h * h + 2.0 * self.damping * h) / self.inertia
 
     def largest_step(self) -> float:
-        """The step (s) at which the number reaches its limit."""
+        """The step (s) at which the number reaches its limit; 0 where nothing gives way."""
+        if math.isinf(self.stiffness):
+            return 0.0
         k, c, m = self.stiffness, self.damping, self.inertia
         return float((np.sqrt(c * c + STABLE * k * m) - c) / k)
 
@@ -244,13 +249,15 @@ def springs(
         sigma_x, sigma_y = law.family_relaxation(tire, load, c_kappa, c_alpha)
         slope = law.factors(tire, load)[1]
         rolling = tire[block.ROLLING_RESISTANCE] * load * radius**2
-        for axis, k, m, at in zip(
-            ("along", "across", "about its axle"),
-            (
+        with np.errstate(divide="ignore"):  # a tire without relaxation does not give way at all
+            stiffness = (
                 slope * law.along(tire) * c_kappa / sigma_x,
                 slope * c_alpha / sigma_y,
                 rolling / tire[block.ROLLING_RELAXATION],
-            ),
+            )
+        for axis, k, m, at in zip(
+            ("along", "across", "about its axle"),
+            stiffness,
             contact_inertia(model, data, wheel),
             (block.DAMPING_TIME, block.DAMPING_TIME, block.ROLLING_DAMPING_TIME),
             strict=True,
