@@ -42,6 +42,13 @@ def statistics(base):
     ]
 
 
+def test_what_a_fit_shows_is_not_simulated_again(base):
+    model = base.bench.simulator.compile(base.plain.variant.edit)
+    again = null_ensemble._predicted(base, base.plain, model)
+    for one, other in zip(again, base.plain.track.predicted, strict=True):
+        assert np.array_equal(one, other)
+
+
 def test_step_integrator_and_what_is_roughly_known_make_no_gap(base):
     shown = statistics(base)
     assert len(shown) == 2 + null_ensemble.DRAWS

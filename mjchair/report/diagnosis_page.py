@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 
 from mjchair.diagnosis.next_experiment.wording import plain
 from mjchair.diagnosis.replay.pulses import Force
-from mjchair.diagnosis.result import Candidate, Diagnosis, Estimate
+from mjchair.diagnosis.result import Candidate, Diagnosis
 from mjchair.effects.library import find
 from mjchair.errors import MjchairError
 from mjchair.report import colours, diagnosis_words
@@ -257,8 +257,8 @@ def _effects(diagnosis: Diagnosis) -> Table:
             [
                 diagnosis_words.plain_name(e.name) + (f" ({e.channel})" if e.channel else ""),
                 diagnosis_words.plain_name(name),
-                f"{p.value:.4g}",
-                _spread(p),
+                diagnosis_words.open_upwards(p) or f"{p.value:.4g}",
+                "held" if p.std is None else f"{p.std:.2g}",
                 p.unit,
                 f"{e.closure:.0%}",
             ]
@@ -267,13 +267,6 @@ def _effects(diagnosis: Diagnosis) -> Table:
         for name, p in e.parameters.items()
     ]
     return Table(heads, rows)
-
-
-def _spread(p: Estimate) -> str:
-    """What is said of how well a number is known."""
-    if p.at_least is not None:
-        return f"at least {p.at_least:.2g}"
-    return "held" if p.std is None else f"{p.std:.2g}"
 
 
 def _gap(diagnosis: Diagnosis) -> Table:

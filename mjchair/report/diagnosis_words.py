@@ -12,7 +12,13 @@ from collections.abc import Iterable, Mapping
 from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.next_experiment.wording import plain
 from mjchair.diagnosis.replay.pulses import Force
-from mjchair.diagnosis.result import Diagnosis, Disagreement, MissingForce, NamedEffect
+from mjchair.diagnosis.result import (
+    Diagnosis,
+    Disagreement,
+    Estimate,
+    MissingForce,
+    NamedEffect,
+)
 from mjchair.diagnosis.rules import LEVEL, PARTLY, Verdict
 
 LEAST = 1e-6  # a chance below this is said to be below it
@@ -257,8 +263,13 @@ def effect_words(effect: NamedEffect) -> str:
 def _parameters(effect: NamedEffect) -> Iterable[str]:
     for name, p in effect.parameters.items():
         unit = "" if p.unit == "1" else f" {p.unit}"
-        size = with_error(p.value, p.std) if p.at_least is None else f"at least {p.at_least:.2g}"
+        size = open_upwards(p) or with_error(p.value, p.std)
         yield f"{plain_name(name)} {size}{unit}"
+
+
+def open_upwards(p: Estimate) -> str:
+    """The least size of a number that may be far larger; empty: it is no such number."""
+    return "" if p.at_least is None else f"at least {p.at_least:.2g}"
 
 
 def with_error(value: float, std: float | None) -> str:

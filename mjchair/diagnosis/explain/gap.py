@@ -156,7 +156,9 @@ def _visible(reduced: Reduced, which: Sequence[int]) -> bool:
 
 def _test(subject: Subject, statistic: float, dof: float, null: Mapping[Subject, float]) -> Test:
     """A test, once what its null shows is taken off: at most the roots of both add up."""
-    statistic = max(np.sqrt(statistic) - np.sqrt(null.get(subject, 0.0)), 0.0) ** 2
+    if subject in null:
+        both = np.sqrt(np.maximum([statistic, null[subject]], 0.0))
+        statistic = max(float(both[0] - both[1]), 0.0) ** 2
     p = float(stats.chi2.sf(statistic, max(dof, 1.0)))
     sigmas = float(stats.norm.isf(max(p, 1e-300) / 2.0)) if p < 1.0 else 0.0
     if p < 1e-290:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.null_ensemble import confirmed
-from mjchair.diagnosis.explain.screening import Base, gap_after
+from mjchair.diagnosis.explain.screening import Base, gap_after, reaches
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.nonlinear import Fitted
@@ -87,12 +87,8 @@ def _shown(size: Array, there: NDArray[np.bool_]) -> bool:
 
 
 def with_terms(base: Base, fitted: Fitted) -> tuple[System, list[int]]:
-    """The system of a fit, and the columns of its effects; none where these are stuck.
-
-    A fit that does not get to what its own step promises is judged as it is.
-    """
-    gain = base.plain.total - fitted.total
-    if not rules.reaches(total=fitted.total, promised=fitted.promised, gain=gain):
+    """The system of a fit, and the columns of its effects; none where these are stuck."""
+    if not reaches(base, fitted):
         return fitted.system, []
     return fitted.system, list(range(fitted.system.nuisance, len(fitted.system.columns)))
 

@@ -64,12 +64,12 @@ def _answers(base: Base, fitted: Fitted, rng: np.random.Generator) -> Iterator[l
     """By how much each member is off the chair of a fit, (rows, channels) a window."""
     simulator = base.bench.simulator
     model = simulator.compile(fitted.variant.edit)
-    here = _predicted(base, fitted, model)
+    here = fitted.track.predicted
     for other in _computed_otherwise(model):
         yield _difference(_predicted(base, fitted, other), here)
     for _ in range(DRAWS):
         moves = _drawn(base, fitted, rng)
-        offsets = {n: by + moves.get(n, 0.0) for n, by in _offsets(fitted).items()}
+        offsets = {n: by + moves[n] for n, by in _offsets(fitted).items()}
         try:
             other = simulator.compile(replace(fitted.variant, offsets=offsets).edit)
         except MjchairError:
@@ -105,11 +105,8 @@ def _drawn(base: Base, fitted: Fitted, rng: np.random.Generator) -> dict[str, fl
     """Moves of the roughly known numbers, in standard deviations, that the data leave open."""
     system = fitted.system
     cover = bounded.covariance(system, base.bench.windows)
-    values, vectors = np.linalg.eigh(cover)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    by = root @ rng.standard_normal(len(values))
-    names = list(_offsets(fitted))
-    return {n: float(by[system.places[RoughlyKnown(n)]]) for n in names}
+    by = rng.multivariate_normal(np.zeros(len(cover)), cover)
+    return {n: float(by[system.places[RoughlyKnown(n)]]) for n in _offsets(fitted)}
 
 
 def _predicted(base: Base, fitted: Fitted, model: mujoco.MjModel) -> Column:

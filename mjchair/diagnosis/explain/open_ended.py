@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain.choice import gain
 from mjchair.diagnosis.explain.screening import Base, nuisances_of
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted, refit
@@ -31,7 +32,7 @@ def with_least_sizes(base: Base, fitted: Fitted) -> Fitted:
             continue
         size = term.values[p.name] - p.neutral
         far = min(max(p.neutral + FURTHER * size, p.low), p.high)
-        if far == term.values[p.name] or not _fits(base, fitted, term, p, far):
+        if far == term.values[p.name] or not _fits(base, fitted, _held(term, p, far)):
             continue
         key = ParameterId(term.effect.key, p.name)
         at_least[key] = _least(base, fitted, term, p)
@@ -52,18 +53,22 @@ def _least(base: Base, fitted: Fitted, term: Term, p: Parameter) -> float:
     low, high = p.neutral, term.values[p.name]
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        if _fits(base, fitted, term, p, middle):
+        if _fits(base, fitted, _held(term, p, middle)):
             high = middle
         else:
             low = middle
     return high
 
 
-def _fits(base: Base, fitted: Fitted, term: Term, p: Parameter, size: float) -> bool:
-    """Whether an effect held at a size is not ruled out, with all else moved as it likes."""
-    most = fitted.total + rules.not_ruled_out(gain=base.plain.total - fitted.total)
-    held = Term(term.effect, {**term.values, p.name: size}, ())
-    terms = tuple(held if t is term else t for t in fitted.variant.terms)
+def _held(term: Term, p: Parameter, size: float) -> Term:
+    """The effect at a size that no fit moves."""
+    return Term(term.effect, {**term.values, p.name: size}, ())
+
+
+def _fits(base: Base, fitted: Fitted, held: Term) -> bool:
+    """Whether an effect that is held so is not ruled out, with all else moved as it likes."""
+    most = fitted.total + rules.not_ruled_out(gain=gain(base, fitted))
+    terms = tuple(held if t.effect is held.effect else t for t in fitted.variant.terms)
     start = replace(fitted.variant, terms=terms)
     nuisances = nuisances_of(base, fitted)
     try:

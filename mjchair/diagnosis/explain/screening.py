@@ -235,6 +235,12 @@ def system_around(base: Base, bench: Bench, fitted: Fitted) -> System:
     return bench.system(fitted.track, columns, count, fitted.variant, free=free)
 
 
+def reaches(base: Base, fitted: Fitted) -> bool:
+    """Whether a fit gets to what its own step promises; one that does not is judged as it is."""
+    gain = base.plain.total - fitted.total
+    return rules.reaches(total=fitted.total, promised=fitted.promised, gain=gain)
+
+
 def gap_after(base: Base, fitted: Fitted, null: Mapping[Subject, float] | None = None) -> Gap:
     """Test what a fit leaves, with its own parameters free.
 
@@ -247,8 +253,7 @@ def gap_after(base: Base, fitted: Fitted, null: Mapping[Subject, float] | None =
       null: statistics that a chair shows which lacks nothing; None: only noise.
     """
     bench, terms = base.bench, fitted.variant.terms
-    gain = base.plain.total - fitted.total
-    if rules.reaches(total=fitted.total, promised=fitted.promised, gain=gain):
+    if reaches(base, fitted):
         system = system_around(base, bench, fitted)
     else:
         nuisances = nuisances_of(base, fitted)
@@ -256,4 +261,5 @@ def gap_after(base: Base, fitted: Fitted, null: Mapping[Subject, float] | None =
         system = bench.system(fitted.track, every, len(nuisances), fitted.variant)
     made = any(p.whole for term in terms for _, p in term.parameters)
     windows = calm(bench.simulator.windows, bench.windows) if made else bench.windows.tolist()
+    gain = base.plain.total - fitted.total
     return gaps.test_gap(bench, system, windows, [t.effect.key for t in terms], gain, null)

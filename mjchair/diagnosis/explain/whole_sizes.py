@@ -19,6 +19,7 @@ import numpy as np
 
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain.candidates import Start
+from mjchair.diagnosis.explain.choice import gain
 from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import ParameterId
@@ -72,13 +73,10 @@ def compared(base: Base, fitted: Fitted) -> Fitted:
     if len(fits) == 1:
         return fitted
     best = min(fits, key=lambda f: f.total)
-    most = rules.not_ruled_out(gain=base.plain.total - best.total)
+    most = rules.not_ruled_out(gain=gain(base, best))
     near = [f for f in fits if f.total - best.total < most]
     std, sigmas = dict(best.std), dict(best.sigmas)
-    for k, term in enumerate(best.variant.terms):
-        p = _parameter(term.effect)
-        if p is None or p.name not in term.free:
-            continue
+    for k, term, p in _whole(best):
         sizes = [f.variant.terms[k].values[p.name] for f in near]
         key = ParameterId(term.effect.key, p.name)
         std[key] = max(std[key], max(sizes) - min(sizes))
@@ -90,10 +88,7 @@ def compared(base: Base, fitted: Fitted) -> Fitted:
 def _beside(base: Base, fitted: Fitted) -> Iterator[Fitted]:
     """Fits that begin at sizes a little smaller and larger than a fit has; those that can be."""
     terms = fitted.variant.terms
-    for k, term in enumerate(terms):
-        p = _parameter(term.effect)
-        if p is None or p.name not in term.free:
-            continue
+    for k, term, p in _whole(fitted):
         for share in (1.0 - BESIDE, 1.0 + BESIDE):
             moved = replace(term, values={**term.values, p.name: share * term.values[p.name]})
             begin = replace(fitted.variant, terms=(*terms[:k], moved, *terms[k + 1 :]))
@@ -101,6 +96,14 @@ def _beside(base: Base, fitted: Fitted) -> Iterator[Fitted]:
                 yield refit(base.bench, begin, fitted.track)
             except (MjchairError, np.linalg.LinAlgError):
                 continue  # this chair cannot have it
+
+
+def _whole(fitted: Fitted) -> Iterator[tuple[int, Term, Parameter]]:
+    """The effects of a fit whose whole sizes are free: place, effect, parameter."""
+    for k, term in enumerate(fitted.variant.terms):
+        p = _parameter(term.effect)
+        if p is not None and p.name in term.free:
+            yield k, term, p
 
 
 def _parameter(effect: Effect) -> Parameter | None:
