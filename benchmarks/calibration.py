@@ -3,9 +3,9 @@
 What it does: takes the lines of `calibration_draws.py`, finds the temper under which what was
 hidden is most probable, and by isotonic regression (scikit-learn) how often a chosen hypothesis was
 right at the odds that the tempered evidence gives, or at its standard errors. Prints reliability on
-base studies that the fit did not see, each fifth of them in turn, and of the real studies of
-`calibration_studies.py`, where these are there. In: the folder of draws.jsonl. Out: with --write,
-mjchair/diagnosis/explain/calibration.toml.
+base studies that the fit did not see, each fifth of them in turn, of the calibration that ships on
+all of them, and of the real studies of `calibration_studies.py`, where these are there. In: the
+folder of draws.jsonl. Out: with --write, mjchair/diagnosis/explain/calibration.toml.
 
     python benchmarks/calibration.py out/calibration --write
 """
@@ -42,6 +42,7 @@ from mjchair.diagnosis.explain.calibration import (
     holds,
     kind,
     log_odds,
+    shipped,
     spoken,
 )
 
@@ -251,6 +252,8 @@ def main() -> None:
     print(table([stated(before, s) for _, s in chosen_only]))
     print("\nchosen effects, calibrated on other base studies\n")
     print(table([stated(k, s) for k, s in chosen_only]))
+    print("\nchosen effects, by the calibration that ships\n")
+    print(table([stated(shipped(), s) for _, s in chosen_only]))
     print(
         "\nthe most probable hypothesis of all, just as it is, calibrated on other base studies\n"
     )
