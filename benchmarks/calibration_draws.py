@@ -354,6 +354,10 @@ class LinearSearch(search.Search):
         """What is here: a linear system neither slides nor shimmies."""
         return here
 
+    def or_by_most_windows(self, here: Any) -> Any:
+        """What is here: a linear system goes another way nowhere."""
+        return here
+
     def _begin_at(self, fewer: Hypothesis, more: Any) -> None:
         """Nothing: a linear fit is the same from wherever it begins."""
 

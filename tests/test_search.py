@@ -64,11 +64,17 @@ def fits(monkeypatch):
     return SimpleNamespace(asked=asked, answers=answers)
 
 
+def put(one, **changes):
+    """Like `replace`, of stubs as well."""
+    stub = isinstance(one, SimpleNamespace)
+    return SimpleNamespace(**vars(one) | changes) if stub else replace(one, **changes)
+
+
 def searching():
     base = SimpleNamespace(
-        bench=SimpleNamespace(simulator=SimpleNamespace(windows=[])),
+        bench=SimpleNamespace(simulator=SimpleNamespace(windows=[]), windows=np.arange(4)),
         nuisances={},
-        plain=SimpleNamespace(total=2000.0, variant=Variant(())),
+        plain=SimpleNamespace(total=2000.0, variant=Variant(()), chi2=np.full(4, 500.0)),
         reduced=SimpleNamespace(total=2000.0),
         around=SimpleNamespace(track="as given", variant=Variant(())),
         found=None,
@@ -271,10 +277,6 @@ def test_what_is_roughly_known_hides_no_effect(fits, monkeypatch, offset, narrow
     )
     other = Hypothesis((MOTOR,), gain=24_000.0, score=24_000.0)
 
-    def put(one, **changes):
-        stub = isinstance(one, SimpleNamespace)
-        return SimpleNamespace(**vars(one) | changes) if stub else replace(one, **changes)
-
     monkeypatch.setattr(search, "replace", put)
     monkeypatch.setattr(search.hypotheses, "singles", lambda *_: [other])
     monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
@@ -288,6 +290,48 @@ def test_what_is_roughly_known_hides_no_effect(fits, monkeypatch, offset, narrow
     first = looking.fit(ONE)
     found, _ = looking.or_as_given((first, SimpleNamespace(exists=True)))
     assert found.hypothesis.keys == (best,)
+    assert (looking.base.reduced is wide) == (best == "rolling")
+
+
+@pytest.mark.parametrize(
+    ("far", "total", "best"),
+    [
+        (9000.0, 1110.0, "motor"),  # by the other windows another effect is the best
+        (9000.0, 1600.0, "rolling"),  # which fits worse
+        (900.0, 1110.0, "rolling"),  # no window is far off
+    ],
+)
+def test_windows_in_which_a_chair_goes_another_way_hide_no_effect(
+    fits, monkeypatch, far, total, best
+):
+    """A caster that swivels to the other side was laid to its sensor."""
+    fits.answers.update(
+        {
+            ("rolling", "as given"): fit(1500.0, "rolling"),
+            ("motor", "as given"): fit(total, "motor"),
+        }
+    )
+    by = []
+
+    def reduce(system, windows):
+        by.append(windows)
+        return SimpleNamespace(total=400.0)
+
+    motor = Hypothesis((MOTOR,), gain=90.0, score=90.0)
+    monkeypatch.setattr(search, "replace", put)
+    monkeypatch.setattr(search.bounded, "reduce", reduce)
+    monkeypatch.setattr(search.hypotheses, "singles", lambda *_: [motor])
+    monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
+    monkeypatch.setattr(search, "believable", lambda _: True)
+    monkeypatch.setattr(search, "gap_after", lambda _, f: SimpleNamespace(exists=f.total > 1200.0))
+    looking = searching()
+    looking.base.bench.windows = np.array([0, 1, 2, 5])
+    looking.base.plain.chi2 = np.array([100.0, 110.0, far, 120.0])
+    looking.base.starts, looking.base.system = (), None
+    wide = looking.base.reduced
+    found, _ = looking.or_by_most_windows((looking.fit(ONE), SimpleNamespace(exists=True)))
+    assert found.hypothesis.keys == (best,)
+    assert by == ([[0, 1, 5]] if far > 1000.0 else [])
     assert (looking.base.reduced is wide) == (best == "rolling")
 
 

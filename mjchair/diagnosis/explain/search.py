@@ -24,6 +24,7 @@ from mjchair.diagnosis.explain.near_fit import NearFit, near_fit
 from mjchair.diagnosis.explain.null_ensemble import confirmed
 from mjchair.diagnosis.explain.screening import FAR, Base, Found, Say, gap_after
 from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.replay.window_states import Track
@@ -35,6 +36,7 @@ REFITTED = 5  # rivals of an effect that is alone
 GROWN = 3  # pairs from which hypotheses of three are grown
 BESIDE = 3  # rivals of each effect that has others beside it
 SHARES = (0.875, 0.75, 0.625, 0.5, 0.375, 0.25, 0.125)  # of linear coefficients, for a new start
+APART = 10.0  # times the chi2 of most windows: there a chair went another way (assumption)
 NARROW = 1.0  # standard deviations: a wall for what may have taken an effect for itself
 SWAPS = 2  # times that a rival takes the place of the chosen hypothesis
 
@@ -90,7 +92,7 @@ def _grown(search: Search) -> WithGap | None:
         size += 1
         more = search.further(here[0] if here else None, size)
         if size == 1:
-            more = search.or_as_given(more)
+            more = search.or_by_most_windows(search.or_as_given(more))
         if more is None and here is None:
             continue
         if more is None or (here is not None and not search.is_worth(here[0], more[0])):
@@ -241,11 +243,29 @@ class Search:
             return here
         if here is not None and not here[1].exists and not _goes_far(here[0].fitted):
             return here
-        self.base = replace(wide, reduced=wide.reduced.narrowed(NARROW))
-        other = self.best_of(hypotheses.singles(self.base.reduced, wide.starts), patient=False)
+        return self._or_weighed_by(wide.reduced.narrowed(NARROW), here)
+
+    def or_by_most_windows(self, here: WithGap | None) -> WithGap | None:
+        """The single effect, or a better one by the linear algebra of most windows alone.
+
+        Where a chair went another way, as where a caster swivels to the other side, no small change
+        explains what is seen, and the windows in which it did hide what the others say: the angle
+        sensor of the caster was taken for what a wheel did that is 2 mm larger.
+        """
+        wide = self.base
+        most = _most_windows(wide)
+        if len(most) == len(wide.bench.windows) or (here is not None and not here[1].exists):
+            return here
+        return self._or_weighed_by(bounded.reduce(wide.system, most), here)
+
+    def _or_weighed_by(self, reduced: Reduced, here: WithGap | None) -> WithGap | None:
+        """The single effect, or a better one by other linear algebra, which then weighs on."""
+        before = self.base
+        self.base = replace(before, reduced=reduced)
+        other = self.best_of(hypotheses.singles(reduced, before.starts), patient=False)
         best = _better(here, other)
         if best is here:
-            self.base = wide
+            self.base = before
         else:
             self.listed.clear()
         return best
@@ -691,6 +711,12 @@ class Search:
             if noted:
                 self._note(f"{noted} was not made anew: {error}")
             return None
+
+
+def _most_windows(base: Base) -> list[int]:
+    """The windows that are fitted to, but for those that disagree far more than most do."""
+    chi2 = base.plain.chi2
+    return [int(i) for i in base.bench.windows[chi2 <= APART * np.median(chi2)]]
 
 
 def _goes_far(fitted: Fitted) -> bool:
