@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import calibration, hypotheses
+from mjchair.diagnosis.explain import calibration, hypotheses, probability
 from mjchair.diagnosis.explain.calibration import Chosen, Weight
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.column_ids import (
@@ -120,6 +120,28 @@ def test_a_clear_effect_is_nearly_certain():
     known = probabilities(made, chosen(made, "rolling_resistance"))
     assert sum(known.values()) == pytest.approx(1.0)
     assert of_effects(known, ["rolling_resistance"]) > rules.PROBABLE
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_a_choice_counts_though_another_fit_of_it_ended_where_it_is_not_there(first, monkeypatch):
+    """A pair was fitted twice, once to where its wind was still: there was no probability of it."""
+    made = base(2.0)
+    choice = chosen(made, "rolling_resistance")
+    still = SimpleNamespace(**vars(fit(made, made.starts[0])))
+    still.fitted.total = made.plain.total - 1.0
+    choice.tried.insert(0 if first else len(choice.tried), still)
+    sure = probabilities(made, chosen(made, "rolling_resistance"))
+    monkeypatch.setattr(probability, "is_there", lambda fitted: fitted is not still.fitted)
+    assert probabilities(made, choice) == pytest.approx(sure)
+
+
+def test_a_hypothesis_whose_only_fit_ended_where_it_is_not_there_has_no_part(monkeypatch):
+    made = base(2.0, alike=0.9)
+    choice = chosen(made, "rolling_resistance")
+    assert "caster_trail" in probability.weights(made, choice)
+    monkeypatch.setattr(probability, "is_there", lambda fitted: fitted is choice.fitted)
+    assert "caster_trail" not in probability.weights(made, choice)
+    assert "rolling_resistance" in probability.weights(made, choice)
 
 
 def test_a_force_of_any_form_speaks_against_effects_only_where_they_leave_a_gap():

@@ -118,18 +118,26 @@ def weights(base: Base, choice: Choice | None) -> dict[str, Weight]:
 
 
 def _kept(base: Base, choice: Choice | None) -> dict[str, float]:
-    """Chi2 that the hypotheses gain which were fitted."""
+    """Chi2 that the hypotheses gain which were fitted, each by the best of its fits."""
     if choice is None:
         return {}
-    fits = {_name(tried.hypothesis): gain(base, tried.fitted) for tried in choice.tried}
+    fits: dict[str, float] = {}
+    for tried in choice.tried:
+        name, gained = _name(tried.hypothesis), gain(base, tried.fitted)
+        fits[name] = max(fits.get(name, gained), gained)
     fits[_name(choice.hypothesis)] = gain(base, choice.fitted)
     return fits
 
 
 def _absent(choice: Choice | None) -> set[str]:
-    """The hypotheses whose fits end where an effect of theirs is not there."""
-    tried = choice.tried if choice is not None else []
-    return {_name(t.hypothesis) for t in tried if not is_there(t.fitted)}
+    """The hypotheses whose fits all end where an effect of theirs is not there; never the choice.
+
+    A pair may be fitted twice, and end once where its wind is still.
+    """
+    if choice is None:
+        return set()
+    there = {_name(t.hypothesis) for t in choice.tried if is_there(t.fitted)}
+    return {_name(t.hypothesis) for t in choice.tried} - there - {_name(choice.hypothesis)}
 
 
 def _overstated(base: Base) -> float:
