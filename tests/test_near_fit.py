@@ -18,12 +18,14 @@ from mjchair.effects.effect import Effect, Parameter
 
 ROWS = 60
 FITTED = {"one": 2.0, "two": 3.0}  # a fit that is not the best
+SIZE = Parameter("size", "N", 1.0, -100.0, 100.0)
+PLACE = Parameter("place", "m", 0.5, -1e3, 1e3, sized=False)
 
 
-def start(name):
+def start(name, *parameters):
     effect = Effect(
         name=name,
-        parameters=(Parameter("size", "N", 1.0, -100.0, 100.0),),
+        parameters=parameters or (SIZE,),
         signature="",
         source="",
         edit=lambda spec, size: None,
@@ -80,6 +82,30 @@ def test_what_is_new_begins_at_its_linear_value_and_the_rest_stays(problem):
 
 
 SMALL = SimpleNamespace(effect=SimpleNamespace(parameters=()))
+
+
+def test_a_place_is_not_set_back_with_what_stands_there():
+    """By its column a wind was still at its drag area's neutral value, which made up for it."""
+    rng = np.random.default_rng(1)
+    one, patch = start("one"), start("patch", SIZE, PLACE)
+    J = rng.standard_normal((ROWS, 3))  # of one, of the patch's size and of its place
+    values = {"size": 3.0, "place": 40.0}
+    r = 0.1 * rng.standard_normal(ROWS)
+    ids = [ParameterId("patch", "size"), ParameterId("patch", "place"), one.columns[0]]
+    columns = J[:, [1, 2, 0]]
+    reduced = Sums(
+        columns=ids, count=0, G=columns.T @ columns, b=columns.T @ r, c=float(r @ r),
+        back=np.zeros(0), precision=np.zeros(0), wall=np.zeros(0),
+    ).plain()  # fmt: skip
+    variant = Variant((), terms=(Term(patch.effect, values, ("size", "place")),))
+    y = r + values["size"] * J[:, 1]  # without the patch
+    near = NearFit(
+        base=SimpleNamespace(reduced=SimpleNamespace(total=float(y @ y))),
+        found=Found((patch,), SimpleNamespace(variant=variant)),
+        reduced=reduced,
+    )
+    left = y - J[:, 0] * (J[:, 0] @ y) / (J[:, 0] @ J[:, 0])
+    assert near.weigh([one]).gain == pytest.approx(y @ y - left @ left)
 
 
 def explained(count, power, price):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import mjchair
+from mjchair.diagnosis import rules
 from mjchair.diagnosis.data import roughly_known
 from mjchair.diagnosis.fit import nonlinear
 from mjchair.diagnosis.fit.column_ids import ParameterId, RoughlyKnown
@@ -89,3 +90,19 @@ def test_a_fit_takes_the_columns_that_an_effect_shares(monkeypatch):
         nonlinear._around(bench, Variant(known, terms=(term,)), None, before)
     assert asked[RoughlyKnown("centre_x")][0] == pytest.approx(6.0 * 0.01 / 0.03)
     assert asked[RoughlyKnown("centre_y")][0] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("speed", "there"), [(2.0, True), (0.02, False)])
+def test_a_wind_is_there_though_its_drag_area_is_not_known(speed, there):
+    """Half the area and 1.4 times the wind push alike; without wind no area is one of a wind.
+
+    In sizes worth finding the wind is known to 0.1 with the area held, and to 0.8 without.
+    """
+    values = {"x": speed, "y": 0.0, "drag_area": 0.6}
+    term = Term(library.find("wind"), values, ("x", "y", "drag_area"))
+    wind, area = np.array([10.0, 0.0, 0.0]), np.array([9.9, 0.0, 1.25])
+    J = np.stack([wind, [0.0, 10.0, 0.0], area], axis=1)
+    system = SimpleNamespace(index=lambda keys: list(range(len(keys))))
+    sigmas = nonlinear._sigmas(term, system, np.linalg.inv(J.T @ J))
+    assert sigmas == pytest.approx(speed / term.effect.parameter("x").change / 0.1)
+    assert rules.is_there(sigmas=sigmas) == there

@@ -89,7 +89,8 @@ class NearFit:
     def _solved(self, starts: Sequence[Start]) -> tuple[list[int], Array, float]:
         """Places of the columns of effects, their coefficients, and chi2.
 
-        Effects that are in and not among these are taken out: set back by what they are.
+        Effects that are in and not among these are taken out: set back by what they are. What only
+        shapes them, as a place does, stays: without them it means nothing.
         """
         r = self.reduced
         which = r.index([c for s in starts for c in self._columns(s)])
@@ -99,7 +100,7 @@ class NearFit:
             if term.effect.key not in keys:
                 for key, p in term.parameters:
                     out.append(r.index([key])[0])
-                    back.append((p.neutral - term.values[p.name]) / p.change)
+                    back.append((p.neutral - term.values[p.name]) / p.change * p.sized)
         by = np.array(back)
         b = r.b - r.G[:, out] @ by
         total = r.total - 2.0 * r.b[out] @ by + by @ r.G[np.ix_(out, out)] @ by

@@ -209,12 +209,17 @@ def _between(one: Variant, other: Variant, share: float) -> Variant:
 
 
 def _sigmas(term: Term, system: System, covariance: Array) -> float:
-    """Significance of an effect's size: of its parameters together, times and places aside."""
-    sized = [(key, p) for key, p in term.parameters if p.sized]
-    if not sized:
+    """Significance of an effect's sizes together, with what only shapes it as it is.
+
+    Without an effect its time, its place or its drag area means nothing, so it is no part of the
+    question whether the effect is there, however little it may be known.
+    """
+    at = system.index([key for key, _ in term.parameters])
+    away = np.array(
+        [(term.values[p.name] - p.neutral) / p.change * p.sized for _, p in term.parameters]
+    )
+    if not away.any():
         return 0.0
-    at = system.index([key for key, _ in sized])
-    away = np.array([(term.values[p.name] - p.neutral) / p.change for _, p in sized])
     return float(np.sqrt(away @ np.linalg.solve(covariance[np.ix_(at, at)], away)))
 
 
