@@ -181,9 +181,7 @@ class Search:
         """
         if best is not None and self.near is not None:
             return self.best_of(self._promising(best), patient=False)
-        top = None if best is None else self.beside(best)
-        if best is not None and not _closes(top, best):
-            top = _better(top, self._fitted_before(size))
+        top = None if best is None else _better(self.beside(best), self._fitted_before(size))
         if best is not None and _closes(top, best):
             return top
         # perhaps the first effect stands in for two others
