@@ -42,6 +42,7 @@ SEEN = 1.0  # sigmas that one standard deviation of a nuisance changes
 FAR = 2.5  # prior standard deviations: a nuisance there is not what moved
 LOUD = 0.01  # share of the power that may shake a chair: below it noise hides nothing
 QUIETER = 0.25  # of the power of what shakes the chair: an explanation that leaves less is right
+ROUNDS = 4  # of the fit of what may be no noise: where it is right they are enough
 AT_REST = 0.01  # m/s^2, bias of an accelerometer that was seen at rest
 
 
@@ -185,7 +186,7 @@ def _noise_left(base: Base, bench: Bench, reduced: Reduced) -> tuple[Bench, Foun
     if best is not None and best.gain > rules.needed(best.free):
         start = replace(base.around.variant, terms=hypotheses.terms(reduced, best))
         try:
-            fitted = refit(bench, start, here, base.nuisances)
+            fitted = refit(bench, start, here, base.nuisances, ROUNDS)
             here, found = fitted.track, Found(best.starts, fitted)
             own = effects_of(base, fitted)
         except (MjchairError, np.linalg.LinAlgError):
