@@ -45,7 +45,7 @@ def fits(monkeypatch):
     """Fits as `refit` is asked for them; each answers (start, before, nuisances) with a fit."""
     asked, answers = [], {}
 
-    def refit(bench, start, before, nuisances=None, rounds=search.ROUNDS):
+    def refit(bench, start, before, nuisances=None, rounds=search.ROUNDS, most=np.inf):
         keys = "+".join(sorted(t.effect.key for t in start.terms))
         asked.append((keys, before))
         answer = answers[keys, before]
@@ -54,7 +54,7 @@ def fits(monkeypatch):
         return answer
 
     def terms(reduced, hypothesis, share=1.0):
-        return tuple(SimpleNamespace(effect=s.effect) for s in hypothesis.starts)
+        return tuple(Term(s.effect, {"size": 1.0}, ()) for s in hypothesis.starts)
 
     monkeypatch.setattr(search.whole_sizes, "fits", lambda *_: ())
     monkeypatch.setattr(search.whole_sizes, "compared", lambda _, fitted: fitted)
@@ -94,6 +94,13 @@ def test_two_effects_that_fit_worse_than_one_start_again_from_it(fits):
     looking = searching()
     assert looking.fit(ONE).fitted.total == 1500.0
     assert looking.fit(BOTH).fitted.total == 1110.0
+
+
+def test_a_fit_that_went_astray_begins_once_more_near_no_effect():
+    """The length of a trail that linear algebra promised turned casters over."""
+    values = {"x": 4.0, "y": -2.0, "drag_area": 0.9}
+    here = search._smaller(Term(wind.EFFECT, values, ("x", "y", "drag_area")))
+    assert here.values == pytest.approx({"x": 0.4, "y": -0.2, "drag_area": 0.9})
 
 
 def test_what_cannot_be_is_tried_once(fits):

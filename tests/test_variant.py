@@ -106,3 +106,19 @@ def test_a_wind_is_there_though_its_drag_area_is_not_known(speed, there):
     sigmas = nonlinear._sigmas(term, system, np.linalg.inv(J.T @ J))
     assert sigmas == pytest.approx(speed / term.effect.parameter("x").change / 0.1)
     assert rules.is_there(sigmas=sigmas) == there
+
+
+@pytest.mark.parametrize(("most", "looked"), [(90.0, 1 + nonlinear.FEW), (np.inf, 13)])
+def test_a_fit_that_stays_worse_than_a_part_of_it_is_not_followed(most, looked, monkeypatch):
+    """It comes down by 1 in every round, from 1000."""
+    totals = iter(range(1000, 0, -1))
+
+    def around(*_):
+        total = next(totals)
+        return SimpleNamespace(total=float(total), promised=0.0, track=None, std={}, variant=None)
+
+    monkeypatch.setattr(nonlinear, "_around", around)
+    monkeypatch.setattr(nonlinear, "_after_linear_step", lambda *_: None)
+    bench = SimpleNamespace(simulator=None)
+    found = nonlinear.refit(bench, None, None, {}, most=most)
+    assert found.total == 1001.0 - looked

@@ -62,7 +62,9 @@ class NearFit:
         near = self.found.fitted
         start = replace(near.variant, terms=self.terms(starts))
         known = nuisances_of(self.base, near)
-        return refit(self.base.bench, start, near.track, known, rounds)
+        every = all(any(s.columns == t.columns for t in starts) for s in self.found.starts)
+        most = near.total if every else np.inf
+        return refit(self.base.bench, start, near.track, known, rounds, most)
 
     def physical(self, starts: Sequence[Start]) -> bool:
         """Whether what is new lies on the allowed side of its parameters."""

@@ -37,6 +37,7 @@ GROWN = 3  # pairs from which hypotheses of three are grown
 BESIDE = 3  # rivals of each effect that has others beside it
 SHARES = (0.875, 0.75, 0.625, 0.5, 0.375, 0.25, 0.125)  # of linear coefficients, for a new start
 APART = 10.0  # times the chi2 of most windows: there a chair went another way (assumption)
+NEAR = 0.1  # of an effect, where a fit begins once more that went astray
 NARROW = 1.0  # standard deviations: a wall for what may have taken an effect for itself
 SWAPS = 2  # times that a rival takes the place of the chosen hypothesis
 
@@ -599,19 +600,23 @@ class Search:
     def _beside_part(self, hypothesis: Hypothesis, fitted: Fitted | None) -> Fitted | None:
         """The fit, or a better one that begins where a part of the hypothesis was fitted.
 
-        With one effect more nothing fits worse, so a fit that does has gone astray.
+        With one effect more nothing fits worse, so a fit that does has gone astray. It then begins
+        near no effect: the size that linear algebra promised led astray.
         """
-        keys = set(hypothesis.keys)
-        every = (*self.tried, *self.again)
-        parts = [t.fitted for t in every if set(t.hypothesis.keys) < keys]
-        part = min(parts, key=lambda f: f.total, default=None)
+        part = self._part(hypothesis)
         if part is None or (fitted is not None and fitted.total <= part.total):
             return fitted
         taken = {term.effect.key for term in part.variant.terms}
-        more = [t for t in self._terms(hypothesis) if t.effect.key not in taken]
+        more = [_smaller(t) for t in self._terms(hypothesis) if t.effect.key not in taken]
         start = replace(part.variant, terms=(*part.variant.terms, *more))
         fits = [f for f in (fitted, self._made_anew(start, part.track)) if f is not None]
         return min(fits, key=lambda f: f.total, default=None)
+
+    def _part(self, hypothesis: Hypothesis) -> Fitted | None:
+        """The best fit of some effects of a hypothesis; None: none was made."""
+        keys, every = set(hypothesis.keys), (*self.tried, *self.again)
+        parts = [t.fitted for t in every if set(t.hypothesis.keys) < keys]
+        return min(parts, key=attrgetter("total"), default=None)
 
     def _best_share(self, hypothesis: Hypothesis) -> float | None:
         """The share of the linear coefficients that fits best as it stands; None: none can be."""
@@ -638,7 +643,9 @@ class Search:
             return self.near.refit(hypothesis.starts, rounds)
         terms = hypotheses.terms(base.reduced, hypothesis, share)
         start = replace(base.around.variant, terms=terms)
-        return refit(base.bench, start, base.around.track, base.nuisances, rounds)
+        part = self._part(hypothesis)
+        most = np.inf if part is None else part.total
+        return refit(base.bench, start, base.around.track, base.nuisances, rounds, most)
 
     def _note(self, line: str) -> None:
         if line not in self.dropped:
@@ -709,6 +716,16 @@ class Search:
             if noted:
                 self._note(f"{noted} was not made anew: {error}")
             return None
+
+
+def _smaller(term: Term) -> Term:
+    """A tenth of an effect, in the place and at the time where it is."""
+    values = {
+        p.name: p.neutral + NEAR * (term.values[p.name] - p.neutral)
+        for _, p in term.parameters
+        if p.sized
+    }
+    return replace(term, values={**term.values, **values})
 
 
 def _most_windows(base: Base) -> list[int]:

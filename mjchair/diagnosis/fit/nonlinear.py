@@ -31,6 +31,7 @@ from mjchair.errors import MjchairError
 
 Array = NDArray[np.float64]
 ROUNDS = 12  # at most, of Gauss-Newton
+FEW = 3  # of these, after which a fit that has gone astray is not followed
 SHORTEST = 1.0 / 32.0  # of a step: where less of it fails as well, none is believed
 SHORTER = (0.1, 0.5)  # of a step that fails: the least and the most that is tried next
 DONE = 1.0  # chi2 that a further round must promise
@@ -73,6 +74,7 @@ def refit(
     before: Track | None,
     nuisances: dict[ColumnId, Column] | None = None,
     rounds: int = ROUNDS,
+    most: float = np.inf,
 ) -> Fitted:
     """Nonlinear fit of nuisances and effects within bounds: Gauss-Newton with a line search.
 
@@ -81,6 +83,8 @@ def refit(
       nuisances: columns to use throughout, with the answers to the slow state of `before`; None:
         both are made anew at `start`. The residual, which decides where the fit ends, is always
         new.
+      most: chi2 that a part of the effects reaches. With more effects nothing fits worse, so a fit
+        that still does after a few rounds has gone astray.
 
     Raises:
       MjchairError: `start` is no chair that can be: it does not compile, or its simulation fails.
@@ -97,7 +101,7 @@ def refit(
     for k in range(rounds):
         # columns that were made anew are followed once, however little they promise
         done = best.total - best.promised < DONE and not (anew and k == 0)
-        if done or share < SHORTEST:
+        if done or share < SHORTEST or (k >= FEW and best.total > most):
             break
         try:
             here = _around(bench, variant, best.track, nuisances, best.std)
