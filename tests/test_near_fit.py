@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mjchair.diagnosis.explain import further_effects, near_fit
+from mjchair.diagnosis.explain import further_effects
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.column_ids import EffectColumn, EffectGroup
 from mjchair.diagnosis.explain.near_fit import NearFit
@@ -82,21 +82,6 @@ def test_what_is_new_begins_at_its_linear_value_and_the_rest_stays(problem):
 
 
 SMALL = SimpleNamespace(effect=SimpleNamespace(parameters=()))
-
-
-@pytest.mark.parametrize(
-    ("names", "most"),
-    [(("one", "two", "three"), 100.0), (("one", "three"), np.inf)],
-)
-def test_more_effects_are_to_fit_better_than_those_that_are_in(problem, monkeypatch, names, most):
-    """Without one of them a fit may be worse."""
-    starts, _, _, near = problem
-    asked = []
-    monkeypatch.setattr(near_fit, "refit", lambda *given: asked.append(given[-1]))
-    monkeypatch.setattr(near_fit, "nuisances_of", lambda *_: {})
-    near.base.bench, near.found.fitted.track, near.found.fitted.total = None, None, 100.0
-    near.refit([starts[n] for n in names], 12)
-    assert asked == [most]
 
 
 def test_a_place_is_not_set_back_with_what_stands_there():

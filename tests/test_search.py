@@ -96,6 +96,30 @@ def test_two_effects_that_fit_worse_than_one_start_again_from_it(fits):
     assert looking.fit(BOTH).fitted.total == 1110.0
 
 
+@pytest.mark.parametrize("near", [False, True])
+def test_more_effects_are_to_fit_better_than_the_best_part_of_them(fits, monkeypatch, near):
+    """A hypothesis without one of these effects may fit worse."""
+    asked = {}
+
+    def refit(bench, start, before, nuisances, rounds, most):
+        asked["+".join(sorted(t.effect.key for t in start.terms))] = most
+        return fit(1400.0)
+
+    def refit_near(starts, rounds, most):
+        asked["+".join(sorted(s.effect.key for s in starts))] = most
+        return fit(1400.0)
+
+    looking = searching()
+    part = Hypothesis((ROLLING,), gain=500.0, score=490.0)
+    looking.tried = [choice.Rival(part, fit(1500.0, "rolling"))]
+    looking.again = [choice.Rival(part, fit(1450.0, "rolling"))]
+    looking.near = SimpleNamespace(refit=refit_near) if near else None
+    monkeypatch.setattr(search, "refit", refit)
+    looking._refit(BOTH, 1.0)
+    looking._refit(Hypothesis((MOTOR, WIND), gain=900.0, score=880.0), 1.0)
+    assert asked == {"motor+rolling": 1450.0, "motor+wind": np.inf}
+
+
 def test_a_fit_that_went_astray_begins_once_more_near_no_effect():
     """The length of a trail that linear algebra promised turned casters over."""
     values = {"x": 4.0, "y": -2.0, "drag_area": 0.9}
@@ -202,7 +226,7 @@ def test_a_second_effect_is_weighed_around_the_fit_of_the_first(fits, monkeypatc
         }
     )
     both = fit(1110.0, "rolling", "motor")
-    near = SimpleNamespace(refit=lambda starts, rounds: both, weigh=lambda starts: ONE)
+    near = SimpleNamespace(refit=lambda starts, rounds, most: both, weigh=lambda starts: ONE)
     monkeypatch.setattr(search, "near_fit", lambda base, found: near)
     monkeypatch.setattr(search.hypotheses, "singles", lambda *_: [ONE])
     monkeypatch.setattr(search.hypotheses, "pairs", lambda *_: [])

@@ -16,7 +16,7 @@ from mjchair.diagnosis import rules
 from mjchair.diagnosis.evidence import evidence, missing_forces
 from mjchair.diagnosis.explain import event, hypotheses, missing_force
 from mjchair.diagnosis.explain.calibration import NONE
-from mjchair.diagnosis.explain.choice import Choice, closure, gain
+from mjchair.diagnosis.explain.choice import Choice, closure
 from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.explain.gap import Gap, forces_left
 from mjchair.diagnosis.explain.left_out import (
@@ -27,7 +27,7 @@ from mjchair.diagnosis.explain.left_out import (
     slow_part,
 )
 from mjchair.diagnosis.explain.probability import of_any, of_effects, probabilities
-from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.noise_levels import FORCES as FORCE_NAMES

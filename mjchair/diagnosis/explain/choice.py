@@ -11,7 +11,7 @@ from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain.column_ids import EffectGroup, ForceGroup
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
-from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit.nonlinear import Fitted
 
 FURTHER = 3.5  # sigmas of a test whose statistic may count as left
@@ -54,11 +54,6 @@ def is_there(fitted: Fitted) -> bool:
     """
     shaped = [t for t in fitted.variant.terms if any(not p.sized for _, p in t.parameters)]
     return all(rules.is_there(sigmas=fitted.sigmas[t.effect.key]) for t in shaped)
-
-
-def gain(base: Base, fitted: Fitted) -> float:
-    """Drop of chi2 that the effects bring."""
-    return base.plain.total - fitted.total
 
 
 def closure(gap: Gap, base: Base, fitted: Fitted, after: Gap) -> float:

@@ -57,13 +57,11 @@ class NearFit:
             at += count
         return tuple(out)
 
-    def refit(self, starts: Sequence[Start], rounds: int) -> Fitted:
-        """The nonlinear fit that begins there."""
+    def refit(self, starts: Sequence[Start], rounds: int, most: float) -> Fitted:
+        """The nonlinear fit that begins there; `rounds` and `most` as `refit` takes them."""
         near = self.found.fitted
         start = replace(near.variant, terms=self.terms(starts))
         known = nuisances_of(self.base, near)
-        every = all(any(s.columns == t.columns for t in starts) for s in self.found.starts)
-        most = near.total if every else np.inf
         return refit(self.base.bench, start, near.track, known, rounds, most)
 
     def physical(self, starts: Sequence[Start]) -> bool:
@@ -101,8 +99,9 @@ class NearFit:
         for term in self.found.fitted.variant.terms:
             if term.effect.key not in keys:
                 for key, p in term.parameters:
-                    out.append(r.index([key])[0])
-                    back.append((p.neutral - term.values[p.name]) / p.change * p.sized)
+                    if p.sized:
+                        out.append(r.index([key])[0])
+                        back.append((p.neutral - term.values[p.name]) / p.change)
         by = np.array(back)
         b = r.b - r.G[:, out] @ by
         total = r.total - 2.0 * r.b[out] @ by + by @ r.G[np.ix_(out, out)] @ by

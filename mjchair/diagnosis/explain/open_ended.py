@@ -11,8 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain.choice import gain
-from mjchair.diagnosis.explain.screening import Base, nuisances_of
+from mjchair.diagnosis.explain.screening import Base, gain, nuisances_of
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted, refit
 from mjchair.diagnosis.fit.variant import Term

@@ -19,11 +19,11 @@ from scipy.special import logsumexp
 from mjchair.diagnosis.explain import calibration, hypotheses
 from mjchair.diagnosis.explain.calibration import NONE, OUTSIDE, Chosen, Weight
 from mjchair.diagnosis.explain.candidates import Start
-from mjchair.diagnosis.explain.choice import Choice, gain, is_there
+from mjchair.diagnosis.explain.choice import Choice, is_there
 from mjchair.diagnosis.explain.column_ids import ForceGroup
 from mjchair.diagnosis.explain.gap import groups
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
-from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.replay.pulses import Force
 

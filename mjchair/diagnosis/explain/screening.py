@@ -236,10 +236,15 @@ def system_around(base: Base, bench: Bench, fitted: Fitted) -> System:
     return bench.system(fitted.track, columns, count, fitted.variant, free=free)
 
 
+def gain(base: Base, fitted: Fitted) -> float:
+    """Drop of chi2 that the effects bring."""
+    return base.plain.total - fitted.total
+
+
 def reaches(base: Base, fitted: Fitted) -> bool:
     """Whether a fit gets to what its own step promises; one that does not is judged as it is."""
-    gain = base.plain.total - fitted.total
-    return rules.reaches(total=fitted.total, promised=fitted.promised, gain=gain)
+    gained = gain(base, fitted)
+    return rules.reaches(total=fitted.total, promised=fitted.promised, gain=gained)
 
 
 def gap_after(base: Base, fitted: Fitted, null: Mapping[Subject, float] | None = None) -> Gap:
@@ -262,5 +267,5 @@ def gap_after(base: Base, fitted: Fitted, null: Mapping[Subject, float] | None =
         system = bench.system(fitted.track, every, len(nuisances), fitted.variant)
     made = any(p.whole for term in terms for _, p in term.parameters)
     windows = calm(bench.simulator.windows, bench.windows) if made else bench.windows.tolist()
-    gain = base.plain.total - fitted.total
-    return gaps.test_gap(bench, system, windows, [t.effect.key for t in terms], gain, null)
+    keys = [t.effect.key for t in terms]
+    return gaps.test_gap(bench, system, windows, keys, gain(base, fitted), null)

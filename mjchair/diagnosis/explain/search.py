@@ -16,13 +16,13 @@ import numpy as np
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import hypotheses, open_ended, whole_sizes
 from mjchair.diagnosis.explain.candidates import Start
-from mjchair.diagnosis.explain.choice import Choice, Rival, gain, is_there
+from mjchair.diagnosis.explain.choice import Choice, Rival, is_there
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.left_out import held_out, with_terms
 from mjchair.diagnosis.explain.near_fit import NearFit, near_fit
 from mjchair.diagnosis.explain.null_ensemble import confirmed
-from mjchair.diagnosis.explain.screening import FAR, Base, Found, Say, gap_after
+from mjchair.diagnosis.explain.screening import FAR, Base, Found, Say, gain, gap_after
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
@@ -37,7 +37,7 @@ GROWN = 3  # pairs from which hypotheses of three are grown
 BESIDE = 3  # rivals of each effect that has others beside it
 SHARES = (0.875, 0.75, 0.625, 0.5, 0.375, 0.25, 0.125)  # of linear coefficients, for a new start
 APART = 10.0  # times the chi2 of most windows: there a chair went another way (assumption)
-NEAR = 0.1  # of an effect, where a fit begins once more that went astray
+SMALLER = 0.1  # of an effect, where a fit begins once more that went astray
 NARROW = 1.0  # standard deviations: a wall for what may have taken an effect for itself
 SWAPS = 2  # times that a rival takes the place of the chosen hypothesis
 
@@ -638,13 +638,12 @@ class Search:
 
     def _refit(self, hypothesis: Hypothesis, share: float, rounds: int = ROUNDS) -> Fitted:
         """The nonlinear fit that begins at a share of the linear fit's coefficients."""
-        base = self.base
+        base, part = self.base, self._part(hypothesis)
+        most = np.inf if part is None else part.total
         if self.near is not None:
-            return self.near.refit(hypothesis.starts, rounds)
+            return self.near.refit(hypothesis.starts, rounds, most)
         terms = hypotheses.terms(base.reduced, hypothesis, share)
         start = replace(base.around.variant, terms=terms)
-        part = self._part(hypothesis)
-        most = np.inf if part is None else part.total
         return refit(base.bench, start, base.around.track, base.nuisances, rounds, most)
 
     def _note(self, line: str) -> None:
@@ -656,7 +655,7 @@ class Search:
         return best is not None and rules.out_of_reach(
             promised=fitted.promised,
             best=best.fitted.total,
-            gain=self.base.plain.total - best.fitted.total,
+            gain=gain(self.base, best.fitted),
         )
 
     def _from(self, hypothesis: Hypothesis, share: float, best: Tried | None) -> Fitted | None:
@@ -721,7 +720,7 @@ class Search:
 def _smaller(term: Term) -> Term:
     """A tenth of an effect, in the place and at the time where it is."""
     values = {
-        p.name: p.neutral + NEAR * (term.values[p.name] - p.neutral)
+        p.name: p.neutral + SMALLER * (term.values[p.name] - p.neutral)
         for _, p in term.parameters
         if p.sized
     }

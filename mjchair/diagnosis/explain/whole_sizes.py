@@ -19,8 +19,7 @@ import numpy as np
 
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain.candidates import Start
-from mjchair.diagnosis.explain.choice import gain
-from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted, refit
