@@ -1,13 +1,20 @@
 """What effects bring on runs that no fit saw: consistent ones bring it, others nothing."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from noisy_run import NOISE, noisy_run
 
+import mjchair
+from mjchair.diagnosis.data.study import make_study
+from mjchair.diagnosis.explain import left_out
 from mjchair.diagnosis.explain.left_out import held_out
+from mjchair.diagnosis.explain.screening import prepare, screen_columns
 from mjchair.diagnosis.fit.column_ids import RoughlyKnown
 from mjchair.diagnosis.fit.system import System
+from mjchair.simulation.initial import Initial
 
 ROWS = 40
 DRAWS = 20
@@ -72,3 +79,31 @@ def test_what_a_run_cannot_tell_it_does_not_foretell():
     slalom = np.column_stack([20.0 * b + 0.1 * a, -20.0 * b + 0.1 * a])
     found = gains([push, push, slalom, slalom], [[1.0, 0.0]] * 4)
     assert found.min() > 500.0  # of 1600; a point estimate from one run foretells the other wrongly
+
+
+@pytest.fixture(scope="module")
+def base():
+    """A coast, and one held out."""
+    rng = np.random.default_rng(5)
+    start = Initial((0.0, 0.0), 0.3, 1.5)
+    spec = mjchair.load_spec()
+    kept, other = (noisy_run(rng, spec, name, start, 4.0) for name in ("coast 0", "coast 1"))
+    study = make_study(spec, [kept, replace(other, hold_out=True)], NOISE)
+    bench, first = prepare(study, threads=1)
+    return screen_columns(bench, first, [])
+
+
+def told_otherwise(base, by):
+    """Chi2 of held-out windows where every speed is foretold otherwise by `by` (samples,)."""
+    before = base.plain.track.predicted
+    predicted = [p + by[: len(p), None] for p in before]
+    fitted = SimpleNamespace(track=SimpleNamespace(predicted=predicted), system=base.plain.system)
+    return left_out.on_held_out(base, fitted).changed
+
+
+def test_what_is_foretold_otherwise_counts_by_its_square(base):
+    wave = 0.01 * np.sin(np.arange(1000) / 20.0)
+    assert told_otherwise(base, 0.0 * wave) == 0.0
+    once = told_otherwise(base, wave)
+    assert once > 10.0
+    assert told_otherwise(base, 2.0 * wave) == pytest.approx(4.0 * once, rel=1e-9)

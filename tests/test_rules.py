@@ -44,7 +44,7 @@ def test_a_gap_that_nothing_gains_on_is_unknown():
     [
         {"closure": rules.PARTLY - 0.01},
         {"gain_by_run": rules.HELD - 0.1},
-        {"held_out": HeldOut(before=1000.0, after=900.0, dof=100.0)},
+        {"held_out": HeldOut(before=1000.0, after=900.0, dof=100.0, changed=900.0)},
     ],
 )
 def test_each_of_these_alone_makes_it_unknown(reason):
@@ -58,7 +58,7 @@ def test_each_of_these_alone_makes_it_unknown(reason):
         {"gain_by_run": rules.HELD},
         {"gap_left": True},
         {"probability": rules.PROBABLE},
-        {"held_out": HeldOut(before=1000.0, after=120.0, dof=100.0)},
+        {"held_out": HeldOut(before=1000.0, after=120.0, dof=100.0, changed=900.0)},
     ],
 )
 def test_just_inside_each_limit_it_is_still_named(allowed):
@@ -94,40 +94,49 @@ def test_a_gap_needs_the_family_and_one_large_test():
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "holds"),
+    ("before", "after", "changed", "holds"),
     [
-        (1000.0, 540.0, True),  # an excess of 900 of which less than half is left
-        (1000.0, 560.0, False),
-        (120.0, 150.0, True),  # no excess beyond scatter, 42 for 100 degrees of freedom
-        (120.0, 163.0, False),  # and one that opens
-        (100.0, 100.0, True),
+        (1000.0, 540.0, 900.0, True),  # an excess of 900 of which less than half is left
+        (1000.0, 560.0, 900.0, False),
+        (1000.0, 540.0, 5000.0, True),  # and no more is asked of what goes too far
+        (1000.0, 890.0, 200.0, True),  # of what changes 200 a hundred is asked
+        (1000.0, 910.0, 200.0, False),
+        (1000.0, 1030.0, 40.0, True),  # what changes nothing has no part in a gap,
+        (1000.0, 1050.0, 40.0, False),  # but opens none beyond scatter, 42
+        (120.0, 150.0, 900.0, True),  # no excess beyond scatter, 42 for 100 degrees of freedom
+        (120.0, 163.0, 900.0, False),  # and one that opens
+        (100.0, 100.0, 900.0, True),
     ],
 )
-def test_what_held_out_trials_say(before, after, holds):
-    assert rules.carries_over(HeldOut(before=before, after=after, dof=100.0)) == holds
+def test_what_held_out_trials_say(before, after, changed, holds):
+    held = HeldOut(before=before, after=after, dof=100.0, changed=changed)
+    assert rules.carries_over(held) == holds
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "again"),
+    ("before", "after", "changed", "again"),
     [
-        (1000.0, 120.0, True),  # held-out trials show what the effects explain
-        (1000.0, 600.0, False),
-        (130.0, 110.0, False),  # they show nothing
+        (1000.0, 120.0, 900.0, True),  # held-out trials show what the effects explain
+        (1000.0, 600.0, 900.0, False),
+        (1000.0, 980.0, 30.0, False),  # another cause's gap
+        (130.0, 110.0, 900.0, False),  # they show nothing
     ],
 )
-def test_what_held_out_trials_show_again_did_not_happen_once(before, after, again):
+def test_what_held_out_trials_show_again_did_not_happen_once(before, after, changed, again):
     """A patch that one run and a held-out one pass over was called an event, and no answer."""
-    held = HeldOut(before=before, after=after, dof=100.0)
+    held = HeldOut(before=before, after=after, dof=100.0, changed=changed)
     assert rules.happened_once(event=990.0, gain=1000.0)
     assert rules.happened_once(event=990.0, gain=1000.0, held=held) != again
     one_run = replace(CLEAR, gain_by_run=7.0, held_out=held)
     assert rules.explains(one_run) == again
 
 
-@pytest.mark.parametrize(("before", "wrong"), [(190.0, True), (180.0, False)])
-def test_a_chair_that_foretells_wrongly_is_no_answer(before, wrong):
+@pytest.mark.parametrize(("chi2", "wrong"), [(190.0, True), (180.0, False)])
+def test_a_chair_that_foretells_wrongly_is_no_answer(chi2, wrong):
     """Twice three standard deviations of 100 degrees of freedom are 85."""
-    assert rules.foretells_wrongly(HeldOut(before=before, after=0.0, dof=100.0)) == wrong
+    assert rules.foretells_wrongly(chi2, 100.0) == wrong
+    held = HeldOut(before=190.0, after=chi2, dof=100.0, changed=20.0)
+    assert rules.more_missing(replace(CLEAR, held_out=held), walls=0) == wrong
 
 
 def share(**changes):

@@ -73,11 +73,15 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class HeldOut:
-    """Held-out trials: chi2 of the slow residual before and after, and its degrees of freedom."""
+    """Held-out trials: chi2 of the slow residual before and after, and its degrees of freedom.
+
+    `changed`: chi2 by which the effects change what is foretold of them.
+    """
 
     before: float
     after: float
     dof: float
+    changed: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,26 +161,31 @@ def explains(choice: Standing) -> bool:
 def carries_over(held: HeldOut) -> bool:
     """Whether the held-out trials, which no fit has seen, do not speak against the effects.
 
-    A gap that shows in them must close by CARRIED; none must open.
+    A gap that shows in them must close by CARRIED of what the effects change there; none must open.
+    Effects that change next to nothing there, as a gyroscope's gain where nothing turns, have no
+    part in a gap of another cause.
     """
-    scatter = _scatter(held)
+    scatter = _scatter(held.dof)
     gap, left = held.before - held.dof, held.after - held.dof
-    return left < max((1.0 - CARRIED) * gap, scatter) if gap > scatter else left < gap + scatter
+    if min(gap, held.changed) <= scatter:
+        return left < gap + scatter
+    return left < max(gap - CARRIED * min(gap, held.changed), scatter)
 
 
 def shows_again(held: HeldOut) -> bool:
     """Whether held-out trials, which no fit has seen, show what the effects explain."""
-    return held.before - held.dof > _scatter(held) and carries_over(held)
+    shown = min(held.before - held.dof, held.changed) > _scatter(held.dof)
+    return shown and carries_over(held)
 
 
-def foretells_wrongly(held: HeldOut) -> bool:
-    """Whether a chair without effects is far off on held-out trials, where its fit may not be."""
-    return held.before - held.dof > 2.0 * _scatter(held)
+def foretells_wrongly(chi2: float, dof: float) -> bool:
+    """Whether a chair is far off on held-out trials, where its fit may not be."""
+    return chi2 - dof > 2.0 * _scatter(dof)
 
 
-def _scatter(held: HeldOut) -> float:
+def _scatter(dof: float) -> float:
     """Chi2 by which noise alone may be off."""
-    return 3.0 * math.sqrt(2.0 * held.dof)
+    return 3.0 * math.sqrt(2.0 * dof)
 
 
 def sure(choice: Standing) -> bool:
@@ -212,7 +221,9 @@ def more_missing(choice: Standing, walls: int) -> bool:
       walls: how many numbers that are only roughly known stand on their walls: they are where what
         is missing pushed them.
     """
-    return choice.gap_left or choice.closure < CLOSES or walls > 0
+    held = choice.held_out
+    wrong = held is not None and foretells_wrongly(held.after, held.dof)
+    return choice.gap_left or choice.closure < CLOSES or walls > 0 or wrong
 
 
 def matters(

@@ -18,8 +18,10 @@ from mjchair.diagnosis.explain.null_ensemble import confirmed
 from mjchair.diagnosis.explain.screening import Base, gap_after, reaches
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
+from mjchair.diagnosis.fit.elimination import eliminate_window
 from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.system import System
+from mjchair.diagnosis.replay.sampling import residual
 
 Array = NDArray[np.float64]
 ALONE = 0.05  # share of a column that the other parts must show, for a part to be held out
@@ -104,7 +106,20 @@ def on_held_out(base: Base, fitted: Fitted) -> rules.HeldOut | None:
     if not held.size:
         return None
     before, dof = slow_part(base.plain.system, held)
-    return rules.HeldOut(before=before, after=slow_part(fitted.system, held)[0], dof=dof)
+    after, changed = slow_part(fitted.system, held)[0], _changed(base, fitted, held)
+    return rules.HeldOut(before=before, after=after, dof=dof, changed=changed)
+
+
+def _changed(base: Base, fitted: Fitted, windows: NDArray[np.int64]) -> float:
+    """Chi2 by which a fit foretells windows otherwise than the chair without effects."""
+    bench, before = base.bench, base.plain.track
+    simulator, out = bench.simulator, 0.0
+    for i in (int(w) for w in windows):
+        by = residual(fitted.track.predicted[i], before.predicted[i], simulator.channels)
+        by[np.isnan(simulator.measured(simulator.windows[i]))] = np.nan
+        none = np.zeros((*by.shape, 0))
+        out += eliminate_window(simulator, before, bench.whitener, i, by, none, bench.process).chi2
+    return out
 
 
 def slow_part(system: System, windows: NDArray[np.int64]) -> tuple[float, float]:
@@ -126,5 +141,5 @@ def plain_gap(base: Base) -> Gap:
     """
     gap = confirmed(base, base.plain, gap_after(base, base.plain))
     held = on_held_out(base, base.plain)
-    foretold = held is None or not rules.foretells_wrongly(held)
+    foretold = held is None or not rules.foretells_wrongly(held.before, held.dof)
     return gap if foretold else replace(gap, exists=True)
