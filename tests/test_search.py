@@ -120,6 +120,19 @@ def test_more_effects_are_to_fit_better_than_the_best_part_of_them(fits, monkeyp
     assert asked == {"motor+rolling": 1450.0, "motor+wind": np.inf}
 
 
+@pytest.mark.parametrize(("known", "fewest", "most"), [(True, 1, 1), (False, 8, 9)])
+def test_what_fits_worse_than_nothing_is_begun_again_only_where_it_may_be_best(
+    fits, known, fewest, most
+):
+    """Shares of an effect were tried although the best was 94 000 better than its promise."""
+    fits.answers["wind", "as given"] = fit(2010.0, "wind", promised=2005.0)
+    looking = searching()
+    best = search.Tried(ONE, fit(400.0, "rolling")) if known else None
+    assert looking.fit(Hypothesis((WIND,), gain=900.0, score=880.0), best) is None
+    assert fewest <= len(fits.asked) <= most
+    assert looking.dropped == ["wind fits worse than nothing and is left out"]
+
+
 def test_a_fit_that_went_astray_begins_once_more_near_no_effect():
     """The length of a trail that linear algebra promised turned casters over."""
     values = {"x": 4.0, "y": -2.0, "drag_area": 0.9}

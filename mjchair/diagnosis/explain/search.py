@@ -551,6 +551,9 @@ class Search:
             return None
         self.say("fit of " + " and ".join(hypothesis.keys))
         fitted = self._beside_part(hypothesis, self._best_start(hypothesis, best))
+        if fitted is not None and gain(self.base, fitted) < 0.0:
+            self._note(f"{' and '.join(hypothesis.keys)} fits worse than nothing and is left out")
+            fitted = None
         if fitted is None:
             self.impossible.append(hypothesis.starts)
             return None
@@ -590,7 +593,11 @@ class Search:
         What the others had to be without this effect may be a valley of its own: with another
         wheel a caster lifts off.
         """
-        if near is not None and not rules.is_stuck(total=near.total, promised=near.promised):
+        if (
+            near is not None
+            and gain(self.base, near) >= 0.0
+            and not rules.is_stuck(total=near.total, promised=near.promised)
+        ):
             return near
         with self.near_to(None):
             afar = self._from(hypothesis, 1.0, best)
@@ -671,9 +678,6 @@ class Search:
             fitted = self._around_terms(fitted)
         elif rules.is_stuck(total=fitted.total, promised=fitted.promised):
             fitted = self._made_anew(fitted.variant, fitted.track) or fitted
-        if fitted.total > self.base.plain.total:
-            self._note(f"{' and '.join(hypothesis.keys)} fits worse than nothing and is left out")
-            return None
         return fitted
 
     def _around_terms(self, fitted: Fitted) -> Fitted:
