@@ -50,6 +50,13 @@ def looked(monkeypatch, chi2, size=0.5):
     return open_ended.with_least_sizes(base, ended(size, chi2(size))), held
 
 
+def test_a_size_near_its_bound_is_not_open(monkeypatch):
+    """A person of whom 73 kg move, and could 81, was known to 8 kg instead of 2."""
+    high = next(p.high for p in find("caster_friction").parameters if p.name == "moment")
+    found, held = looked(monkeypatch, lambda moment: 3000.0, size=0.6 * high)
+    assert held == [] and found.std[MOMENT] == 0.03 and not found.at_least
+
+
 def test_a_stuck_caster_has_at_least_the_friction_at_which_it_sticks(monkeypatch):
     found, _ = looked(monkeypatch, lambda moment: 3000.0 if moment > 0.36 else PLAIN)
     assert found.at_least[MOMENT] == pytest.approx(0.36, abs=0.5 / 2**open_ended.HALVINGS)

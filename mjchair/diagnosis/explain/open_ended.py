@@ -19,6 +19,7 @@ from mjchair.effects.effect import Parameter
 from mjchair.errors import MjchairError
 
 FURTHER = 8.0  # times the size: far beyond what a standard error may say of it
+LEAST = 2.0  # times the size that bounds must allow: what is near fits nearly as well anyhow
 HALVINGS = 5  # of the way from no effect to the size, until the least one is found
 
 
@@ -31,7 +32,9 @@ def with_least_sizes(base: Base, fitted: Fitted) -> Fitted:
             continue
         size = term.values[p.name] - p.neutral
         far = min(max(p.neutral + FURTHER * size, p.low), p.high)
-        if far == term.values[p.name] or not _fits(base, fitted, _held(term, p, far)):
+        if abs(far - p.neutral) < LEAST * abs(size):
+            continue
+        if not _fits(base, fitted, _held(term, p, far)):
             continue
         key = ParameterId(term.effect.key, p.name)
         at_least[key] = _least(base, fitted, term, p)
