@@ -119,6 +119,32 @@ def test_a_fit_that_stays_worse_than_a_part_of_it_is_not_followed(most, looked, 
 
     monkeypatch.setattr(nonlinear, "_around", around)
     monkeypatch.setattr(nonlinear, "_after_linear_step", lambda *_: None)
+    monkeypatch.setattr(nonlinear, "_between", lambda *_: None)
     bench = SimpleNamespace(simulator=None)
     found = nonlinear.refit(bench, None, None, {}, most=most)
     assert found.total == 1001.0 - looked
+
+
+def test_after_a_short_step_the_next_is_twice_as_long_and_not_whole(monkeypatch):
+    """Every second round was lost on a whole step where only a fifth of one helped."""
+    aim, tried = 10.0, []
+
+    def around(bench, variant, *_):
+        at = variant.offsets.get("mass", 0.0)
+        tried.append(at)
+        step = aim - at
+        # no step of more than 2.5 helps: there a caster turns over
+        far = len(tried) > 1 and abs(at - best[-1]) > 2.5
+        total = 1e4 if far else 100.0 + step**2
+        if not far:
+            best.append(at)
+        return SimpleNamespace(total=total, promised=100.0, track=None, std={}, variant=variant)
+
+    best = [0.0]
+    monkeypatch.setattr(nonlinear, "_around", around)
+    monkeypatch.setattr(
+        nonlinear, "_after_linear_step", lambda *_: Variant((), offsets={"mass": aim})
+    )
+    found = nonlinear.refit(SimpleNamespace(simulator=None), Variant(()), None, {})
+    failed = sum(t not in best for t in tried)
+    assert failed <= 4 and found.total < 105.0

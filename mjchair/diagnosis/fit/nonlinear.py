@@ -32,8 +32,9 @@ from mjchair.errors import MjchairError
 Array = NDArray[np.float64]
 ROUNDS = 12  # at most, of Gauss-Newton
 FEW = 3  # of these, after which a fit that has gone astray is not followed
-SHORTEST = 1.0 / 32.0  # of a step: where less of it fails as well, none is believed
+SHORTEST = 1.0 / 32.0  # of a step: where that fails as well, none is believed
 SHORTER = (0.1, 0.5)  # of a step that fails: the least and the most that is tried next
+LONGER = 2.0  # times the share of a step that brought something, for the next
 DONE = 1.0  # chi2 that a further round must promise
 ROUGH = 10.0  # chi2 promised, below which a fit ends where a round brings less than half of DONE
 
@@ -101,7 +102,7 @@ def refit(
     for k in range(rounds):
         # columns that were made anew are followed once, however little they promise
         done = best.total - best.promised < DONE and not (anew and k == 0)
-        if done or share < SHORTEST or (k >= FEW and best.total > most):
+        if done or (k >= FEW and best.total > most):
             break
         try:
             here = _around(bench, variant, best.track, nuisances, best.std)
@@ -109,12 +110,16 @@ def refit(
             shorter = SHORTER[1]
         else:
             if here.total < best.total:
-                brought = best.total - here.total
-                share, best, variant = 1.0, here, _after_linear_step(bench, here)
+                brought, best = best.total - here.total, here
                 if brought < 0.5 * DONE and here.total - here.promised < ROUGH:
                     break
+                share = min(LONGER * share, 1.0)
+                variant = _between(here.variant, _after_linear_step(bench, here), share)
                 continue
             shorter = _shorter(best, here.total, share)
+        if share <= SHORTEST:
+            break
+        shorter = max(shorter, SHORTEST / share)
         share, variant = share * shorter, _between(best.variant, variant, shorter)
     return best
 
