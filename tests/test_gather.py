@@ -152,6 +152,24 @@ def test_even_strokes_leave_the_lag_open():
         align(Signal(time, stroke + noise[0]), Signal(time, stroke + noise[1]))
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_run_of_ten_seconds_that_slows_down_is_aligned(seed):
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 10.0, 0.01)
+    begins = 0.6 + np.cumsum(np.r_[0.0, 1.05 * (1.0 + 0.06 * rng.normal(size=6))])
+    strengths = 1.0 + 0.06 * rng.normal(size=begins.size)
+    pulls = [
+        size * np.exp(-(((time - t) / 0.15) ** 2))
+        for t, size in zip(begins, strengths, strict=True)
+    ]
+    speed = 2.5 + np.cumsum(np.sum(pulls, axis=0) - 0.35) * 0.01 * 3.0
+    own = np.arange(0.0, 9.4, 0.01)
+    one = speed + 0.01 * rng.normal(size=time.size)
+    two = np.interp(own + 0.37, time, speed) + 0.01 * rng.normal(size=own.size)
+    found = align(Signal(time, one), Signal(own, two))
+    assert abs(found.offset - 0.37) < 4.0 * found.offset_std < 0.02
+
+
 @pytest.mark.parametrize("drift", [0.0, 400e-6])
 def test_drift_is_found_with_its_uncertainty(drift):
     rng = np.random.default_rng(4)

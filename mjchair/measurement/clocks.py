@@ -4,10 +4,12 @@ In: two signals that go with one motion (a wheel's speed by two instruments, or 
 and an accelerometer), each on its own clock. Out: offset and drift of the second clock with their
 standard deviations, or the reason why they cannot be told.
 
-The offset is the lag of the largest correlation of the band-passed signals, refined by a parabola;
-its standard deviation is the Cramer-Rao bound of a delay in coloured noise. Strokes that come
-evenly make other lags nearly as good, a stroke aside: an alignment is clear only if chance would
-not put another lag that near. Drift is the slope of offsets of parts of the recording.
+The offset is the lag of the largest correlation of the smoothed signals, refined by a parabola. At
+every lag a constant and a slope of what lies together are taken out of both: a high-pass filter
+rings at the ends of a recording of 10 s, at another place in each of the two. The offset's standard
+deviation is the Cramer-Rao bound of a delay in coloured noise. Strokes that come evenly make other
+lags nearly as good, a stroke aside: an alignment is clear only if chance would not put another lag
+that near. Drift is the slope of offsets of parts of the recording.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ from mjchair.errors import MjchairError
 Array = NDArray[np.float64]
 
 GRID = 100.0  # Hz, on which signals are compared
-BAND = (0.15, 8.0)  # Hz, of the motion of a wheelchair that is compared
+FASTEST = 8.0  # Hz, of the motion of a wheelchair that is compared
+TREND = 2  # columns that are taken out of both signals: a constant and a slope
 OVERLAP = 3.0  # s, the least part of two recordings that must lie together
 SHARE = 0.3  # of the shorter recording, the same
 LEAST = 0.6  # correlation below which two signals are not of one motion
@@ -134,14 +137,14 @@ def best_alignment(reference: Signal, other: Signal) -> Alignment:
 
 
 def _even(signal: Signal) -> Signal:
-    """The signal on the common grid, band-passed, (m, k), with unit variance a column."""
+    """The signal on the common grid, smoothed, without its mean, (m, k)."""
     time = np.arange(signal.time[0], signal.time[-1], 1.0 / GRID)
     values = np.atleast_2d(signal.values.T).T
     even = np.column_stack([np.interp(time, *_there(signal.time, v)) for v in values.T])
     if len(even) > 4 * GRID / 10:
-        sos = butter(2, BAND, "bandpass", fs=GRID, output="sos")
-        even = sosfiltfilt(sos, even - even.mean(axis=0), axis=0, padlen=min(200, len(even) - 2))
-    return Signal(time, even)
+        sos = butter(2, FASTEST, "lowpass", fs=GRID, output="sos")
+        even = sosfiltfilt(sos, even, axis=0)
+    return Signal(time, even - even.mean(axis=0))
 
 
 def _there(time: Array, values: Array) -> tuple[Array, Array]:
@@ -152,27 +155,55 @@ def _there(time: Array, values: Array) -> tuple[Array, Array]:
 def _correlation(one: Array, two: Array) -> tuple[NDArray[np.int64], Array]:
     """Lags (samples) and the correlation of the first column of `one` with all columns of `two`.
 
-    With several columns it is the multiple correlation: the best sum of them at each lag.
+    It is that of what lies together, beside a constant and a slope. With several columns it is the
+    multiple correlation: the best sum of them at each lag.
     """
     first = one[:, 0]
-    full = len(first) + len(two) - 1
-    lags = np.arange(full) - (len(two) - 1)
+    lags = np.arange(len(first) + len(two) - 1) - (len(two) - 1)
     count = _together(len(first), len(two), lags)
-    power = correlate(first**2, np.ones(len(two)), "full", "fft")
-    cross = np.column_stack([correlate(first, c, "full", "fft") for c in two.T])
-    squares = np.empty((full, two.shape[1], two.shape[1]))
-    for i in range(two.shape[1]):
-        for j in range(two.shape[1]):
-            squares[:, i, j] = correlate(np.ones(len(first)), two[:, i] * two[:, j], "full", "fft")
-    enough = count >= max(OVERLAP * GRID, SHARE * min(len(first), len(two)))
-    match = np.zeros(full)
-    small = 1e-9 * np.trace(squares[enough].mean(axis=0)) * np.eye(two.shape[1])
-    weights = np.linalg.solve(squares[enough] + small, cross[enough][..., None])[..., 0]
-    gained = np.sum(weights * cross[enough], axis=1)
-    match[enough] = np.sqrt(np.clip(gained / np.maximum(power[enough], 1e-30), 0.0, 1.0))
+    enough = np.flatnonzero(count >= max(OVERLAP * GRID, SHARE * min(len(first), len(two))))
+    products, cross, power = (sums[enough] for sums in _sums(first, two))
+    by_trend = _explained(products[:, :TREND, :TREND], cross[:, :TREND])
+    by_all = _explained(products, cross)
+    match = np.zeros(lags.size)
+    share = (by_all - by_trend) / np.maximum(power - by_trend, 1e-30)
+    match[enough] = np.sqrt(np.clip(share, 0.0, 1.0))
     if two.shape[1] == 1:
-        match[enough] *= np.sign(cross[enough][:, 0])
+        weights = np.linalg.solve(products, cross[..., None])[..., 0]
+        match[enough] *= np.sign(weights[:, TREND])
     return lags, match
+
+
+def _sums(first: Array, two: Array) -> tuple[Array, Array, Array]:
+    """Sums over what lies together, at each lag.
+
+    Of products of the columns 1, time and `two`, (lags, k, k); of these with `first`, (lags, k);
+    and of its square, (lags,).
+    """
+    here, there = np.ones(len(first)), np.ones(len(two))
+    slope = np.linspace(-1.0, 1.0, len(first))
+    # each column as what moves with the first signal's samples, and what with the second's
+    columns = [(here, there), (slope, there), *((here, c) for c in two.T)]
+
+    def summed(mine: Array, other: Array) -> Array:
+        return np.asarray(correlate(mine, other, "full", "fft"))
+
+    products = np.array([[summed(a * c, b * d) for c, d in columns] for a, b in columns])
+    cross = np.array([summed(first * a, b) for a, b in columns])
+    small = 1e-9 * np.eye(len(columns)) * products.diagonal().mean(axis=0)[None]
+    return products.transpose(2, 0, 1) + small, cross.T, summed(first**2, there)
+
+
+def _explained(products: Array, cross: Array) -> Array:
+    """How much of the square of a signal columns explain, at each lag."""
+    weights = np.linalg.solve(products, cross[..., None])[..., 0]
+    return np.asarray(np.sum(weights * cross, axis=1))
+
+
+def _beside_trend(values: Array) -> Array:
+    """Columns (n, k) without their constant and slope."""
+    trend, _ = np.linalg.qr(np.column_stack([np.ones(len(values)), np.arange(len(values))]))
+    return np.asarray(values - trend @ (trend.T @ values))
 
 
 def _together(first: int, second: int, lag: NDArray[np.int64] | int) -> NDArray[np.int64] | int:
@@ -190,7 +221,7 @@ def _refined(lags: NDArray[np.int64], match: Array, best: int) -> float:
 
 def _spread(values: Array, rho: float, together: float) -> float:
     """Standard deviation of the lag, s: the Cramer-Rao bound, at least a tenth of a grid step."""
-    first = values[:, 0]
+    first = _beside_trend(values[:, :1])[:, 0]
     bandwidth = np.std(np.diff(first)) * GRID / max(float(np.std(first)), 1e-30)  # rad/s
     noise = (1.0 - rho**2) / max(rho**2, 1e-6)
     bound = np.sqrt(noise / (max(INDEPENDENT * together, 1.0) * bandwidth**2))
@@ -233,7 +264,7 @@ def _drift(one: Signal, two: Signal, offset: float) -> tuple[float, float, float
 def _local_lag(one: Signal, two: Signal, offset: float, window: Array) -> tuple[float, float]:
     """How much more than `offset` a part is off, s, and its spread; NaN where it does not tell."""
     inside = (one.time >= window[0]) & (one.time <= window[1])
-    first = one.values[inside, 0]
+    first = _beside_trend(one.values[inside, :1])[:, 0]
     shifts = np.arange(-round(NEAR * GRID), round(NEAR * GRID) + 1)
     match = np.zeros(shifts.size)
     for i, shift in enumerate(shifts):
@@ -241,6 +272,7 @@ def _local_lag(one: Signal, two: Signal, offset: float, window: Array) -> tuple[
         if time[0] < two.time[0] or time[-1] > two.time[-1]:
             continue
         columns = np.column_stack([np.interp(time, two.time, c) for c in two.values.T])
+        columns = _beside_trend(columns)
         fit = columns @ np.linalg.lstsq(columns, first, rcond=None)[0]
         match[i] = float(first @ fit) / max(
             float(np.linalg.norm(first) * np.linalg.norm(fit)), 1e-30
