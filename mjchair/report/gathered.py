@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mjchair.measurement.gather.instruments import Instrument
 from mjchair.measurement.gather.join import GatheredTrial
+from mjchair.measurement.sensors import sensor
 from mjchair.report.colours import FAINT, NOTE, SERIES, SIDES
 from mjchair.report.figure import Figure
 
@@ -122,17 +123,33 @@ def _torque(axes: Axes, trial: GatheredTrial, driven: Sequence[Instrument]) -> N
         )  # fmt: skip
     axes.axhline(0.0, color=NOTE, lw=0.6)
     axes.set_ylabel("torque about the axle (N m)")
-    axes.legend(fontsize=7, loc="best", framealpha=0.8)
+    _legend_above(axes)
 
 
 def _turning(axes: Axes, trial: GatheredTrial) -> None:
+    """The turning rate where a sensor on the frame tells it; else what the wheels' sensors show."""
     frame = next((i for i in trial.instruments if "imu_gyro.z" in i.channels), None)
     if frame is not None:
         time = frame.time - trial.begin
         axes.plot(time, frame.channels["imu_gyro.z"], lw=1.0, color=SERIES[2], label=frame.name)
-        axes.legend(fontsize=7, loc="best")
-    spans = [n for n in trial.columns if n.endswith(("_speed", "_angle"))]
-    if not frame and spans:
-        there = np.isfinite(trial.columns[spans[0]])
-        axes.plot(trial.time[there], trial.columns[spans[0]][there], lw=1.0, color=SERIES[2])
-    axes.set_ylabel("turning rate (rad/s)" if frame else (spans or [""])[0])
+        axes.set_ylabel("turning rate (rad/s)")
+        _legend_above(axes)
+        return
+    kinds = [k for k in ("_speed", "_angle") if any(n.endswith(k) for n in trial.columns)]
+    for name in (n for n in trial.columns if n.endswith(tuple(kinds[:1]))):
+        wheel = name.removesuffix(kinds[0])
+        there = np.isfinite(trial.columns[name])
+        axes.plot(
+            trial.time[there], trial.columns[name][there], "--" if wheel == "right_wheel" else "-",
+            lw=1.0, color=SIDES.get(wheel, SERIES[2]), label=name.replace("_", " "),
+        )  # fmt: skip
+        axes.set_ylabel(f"{kinds[0].removeprefix('_')} ({sensor(name).unit})")
+    if kinds:
+        _legend_above(axes)
+
+
+def _legend_above(axes: Axes) -> None:
+    """The legend in one row above the axes, so that it hides no curve."""
+    axes.legend(
+        fontsize=7, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, frameon=False
+    )  # fmt: skip
