@@ -214,13 +214,24 @@ class Search:
 
         The first effect may stand in for two others, whose fit is at hand.
         """
-        known = self.base.best
-        if known is None or len(known.starts) != size:
+        known, left = self.base.best, self._left_over()
+        if known is None or size not in (len(left), len(known.starts)):
             return None
-        every = self.weigh(known.starts)
+        every = self.weigh(left if len(left) == size else known.starts)
         self._begin_at(every, known.fitted)
         tried = self.believed(every)
         return None if tried is None else (tried, gap_after(self.base, tried.fitted))
+
+    def _left_over(self) -> list[Start]:
+        """The effects that are clear of what was best while the noise was sought.
+
+        There the best hypothesis of any size is fitted. In it, effects that only made up for a
+        large one being no linear one come to nothing.
+        """
+        known = self.base.best
+        if known is None:
+            return []
+        return [s for s in known.starts if known.fitted.sigmas[s.effect.key] > rules.SIGMAS]
 
     def settled(self, here: WithGap) -> WithGap:
         """A fit with the gap that it leaves once everything is made anew around it.
@@ -272,15 +283,10 @@ class Search:
     def or_left_over(self, here: WithGap) -> WithGap:
         """The single effect, or a better one that was left over while the noise was sought.
 
-        There the best hypothesis of any size is fitted. In it, effects that only made up for a
-        large one being no linear one come to nothing, and the large one is left. By linear algebra
-        another may be the best alone.
+        By linear algebra another may be the best alone.
         """
-        known = self.base.best
-        if not here[1].exists or known is None or len(known.starts) == 1:
-            return here
-        left = [s for s in known.starts if known.fitted.sigmas[s.effect.key] > rules.SIGMAS]
-        if len(left) != 1:
+        known, left = self.base.best, self._left_over()
+        if not here[1].exists or known is None or len(known.starts) == 1 or len(left) != 1:
             return here
         alone = self.weigh(left)
         self._begin_at(alone, known.fitted)
@@ -529,11 +535,34 @@ class Search:
         if others and not near:  # the first is always fitted: linear algebra tells little of it
             near = [h for h in options[:1] if rules.may_be_alike(less=here.gain - h.gain, own=own)]
         tried = [self.fit(h, chosen) for h in near[: REFITTED if not others else BESIDE]]
+        tried += self._in_place_of(start, others, [h.keys for h in near])
         return [
             Rival(t.hypothesis, t.fitted)
             for t in tried
             if t is not None and is_there(t.fitted) and _not_ruled_out(t, chosen, own)
         ]
+
+    def _in_place_of(
+        self, start: Start, others: Sequence[Start], but: Collection[Sequence[str]]
+    ) -> list[Tried]:
+        """The best of what was fitted before of the others with another effect.
+
+        Linear algebra around a fit may not see how two large effects replace one another.
+
+        Args:
+          but: keys of hypotheses that are left out.
+        """
+        stay, seen = {s.effect.key for s in others}, [set(keys) for keys in but]
+        fits = [
+            Tried(t.hypothesis, t.fitted)
+            for t in self.tried
+            if len(t.hypothesis.starts) == len(others) + 1
+            and stay < set(t.hypothesis.keys)
+            and start.effect.key not in t.hypothesis.keys
+            and set(t.hypothesis.keys) not in seen
+        ]
+        best = {frozenset(t.hypothesis.keys): t for t in sorted(fits, key=lambda t: -t.price)}
+        return list(best.values())
 
     def fit(self, hypothesis: Hypothesis, best: Tried | None = None) -> Tried | None:
         """The nonlinear fit; from a second start where the first misses what was promised.
