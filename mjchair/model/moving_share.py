@@ -4,9 +4,9 @@ In: the specification of a chair, and the mass (kg) that moves. Out: the mass, c
 inertia of that share; `take` leaves the rest to the chair's body, so that both together are what
 the chair was. The upper body moves first (head, chest, abdomen and arms, all alike), then the
 rest of the person with it. So the whole of a person can move on a chair, and what is left is still
-the frame, which has a mass and an inertia. A little more than the person can move too: mass and
-displacement are measured as a product, and a displacement that is 5 % short makes the mass 5 %
-large.
+the frame, which has a mass and an inertia. A mass beyond the person's can be asked for too: mass
+and displacement are measured as a product, and a displacement that is 5 % short makes the mass 5 %
+large. Then the whole person moves, farther than was measured.
 
 The share and the rest turn together, so that only the sum of their inertias shows. It is shared
 out by mass, which makes two bodies that can be wherever the whole can be.
@@ -25,7 +25,7 @@ from mjchair.model.wheels import base_name
 
 Array = NDArray[np.float64]
 STAYS = ("pelvis", "thigh", "shank", "foot")  # of the person: what rests on seat and footrest
-MORE = 1.1  # of the person's mass that may move at most, of a displacement that is a tenth short
+MORE = 1.25  # of the mass of the person at most, of a displacement that is a fifth short
 LEFT = 0.05  # of the mass of the chair's body that stays in any case
 UNKNOWN = 0.9  # of the mass of a chair's body that may move where nobody says who sits on it
 REMEMBERED = "rider_share"  # custom numeric: the most that moves, then upper body and rest
@@ -81,24 +81,24 @@ def _inertial(numbers: list[float]) -> Inertial:
 
 
 def most(spec: mujoco.MjSpec) -> float:
-    """The mass (kg) that can move on this chair: a tenth more than its rider's.
+    """The mass (kg) that may be said to move on this chair: a quarter more than its rider's.
 
     Of a chair of unknown load, 0.9 of its body.
     """
     known = _remembered(spec)
     if known is not None:
         return known[0]
-    sitting, chair = person(spec), float(_chair(spec).mass)
+    sitting = person(spec)
     if sitting is None:
-        return UNKNOWN * chair
-    return min(MORE * (sitting[0].mass + sitting[1].mass), (1.0 - LEFT) * chair)
+        return UNKNOWN * float(_chair(spec).mass)
+    return MORE * (sitting[0].mass + sitting[1].mass)
 
 
 def share(spec: mujoco.MjSpec, mass: float) -> Inertial:
     """What moves when `mass` (kg) of the rider moves, in the chair's frame.
 
-    Of a variant that is lighter than the chair that it was made of, LEFT of the chair's body
-    stays: then what moves has less mass and must move farther, since the product counts.
+    It has no more than the person's, and LEFT of the chair's body stays in any case: then what
+    moves has less mass and must move farther, since the product counts.
 
     Raises:
       MjchairError: a mass that is not positive, or more than `most`.
@@ -109,25 +109,15 @@ def share(spec: mujoco.MjSpec, mass: float) -> Inertial:
             f"{mass:g} kg cannot move on this chair; with its rider (occupant_mass) the mass that "
             f"moves must be positive and at most {limit:.4g} kg"
         )
-    chair = inertials.of_body(_chair(spec))
+    chair, sitting = inertials.of_body(_chair(spec)), person(spec)
     mass = min(mass, (1.0 - LEFT) * chair.mass)
-    return _part(chair, mass, _centre(person(spec), chair, mass))
-
-
-def _centre(sitting: tuple[Inertial, Inertial] | None, chair: Inertial, mass: float) -> Array:
-    """Centre of mass (3,) m of what moves; without a rider, of the chair's body."""
     if sitting is None:
-        return chair.centre
+        return _part(chair, mass, chair.centre)
     upper, rest = sitting
+    mass = min(mass, upper.mass + rest.mass)
     first = min(mass, upper.mass)
-    second = min(mass - first, rest.mass)
-    moment = first * upper.centre + second * rest.centre
-    beyond = mass - first - second
-    if beyond > 0.0:  # an even share of the frame
-        frame = chair.mass - upper.mass - rest.mass
-        own = chair.mass * chair.centre - upper.mass * upper.centre - rest.mass * rest.centre
-        moment = moment + beyond * (own / frame if frame > beyond else chair.centre)
-    return np.asarray(moment / mass)
+    centre = (first * upper.centre + (mass - first) * rest.centre) / mass
+    return _part(chair, mass, np.asarray(centre))
 
 
 def _part(chair: Inertial, mass: float, centre: Array) -> Inertial:

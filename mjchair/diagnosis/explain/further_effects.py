@@ -94,11 +94,12 @@ def _first(search: Search) -> Explained:
     known = [_left(base, (), base.plain)]
     best = search.best_single()
     tried = search.fit(best) if best and best.gain > rules.needed(best.free) else None
-    if best and tried:
-        known.append(_left(base, best.starts, search.anew(tried)))
+    fitted = search.anew(tried) if tried else None
+    if best and fitted:
+        known.append(_left(base, best.starts, fitted))
     if whole_sizes.shimmies(base) or min(noise_shown.loudness(e.bench) for e in known) > SHAKEN:
         search.say("effects of whole sizes")
-        known += [_left(base, (s,), f) for s, f in whole_sizes.fits(base)]
+        known += [_left(base, (s,), f) for s, f in whole_sizes.fits(base, fitted)]
     first = min(known, key=attrgetter("price"))
     return _agreed(base, first) if first.starts else first
 
