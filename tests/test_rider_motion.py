@@ -91,13 +91,13 @@ def test_more_than_the_person_is_the_person_who_moves_farther(heavy):
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    for _ in range(500):
+    for _ in range(750):  # 1.5 s: at the far end of the motion
         data.actuator("rider_motion").ctrl[0] = 0.03 * (1.0 - np.cos(2.0 * np.pi * data.time))
         mujoco.mj_step(model, data)
     asked = 0.03 * (1.0 - np.cos(2.0 * np.pi * (data.time - model.opt.timestep)))
     product = model.body("rider_motion").mass[0] * data.joint("rider_motion").qpos[0]
     assert model.body("rider_motion").mass[0] == pytest.approx(90.0)
-    assert product == pytest.approx(108.0 * asked, abs=0.02 * 108.0 * 0.06)
+    assert product == pytest.approx(108.0 * asked, rel=0.02)
 
 
 def test_the_old_name_is_understood_with_a_note():

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, correlate, sosfiltfilt
+from scipy.signal import butter, correlate, detrend, sosfiltfilt
 
 from mjchair.errors import MjchairError
 
@@ -125,7 +125,7 @@ def best_alignment(reference: Signal, other: Signal) -> Alignment:
     offset, drift, drift_std, agree = _drift(one, two, start + lag)
     return Alignment(
         offset=offset,
-        offset_std=_spread(one.values, rho, together),
+        offset_std=_spread(detrend(one.values[:, 0]), rho, together),
         drift=drift,
         drift_std=drift_std,
         correlation=rho,
@@ -163,13 +163,14 @@ def _correlation(one: Array, two: Array) -> tuple[NDArray[np.int64], Array]:
     count = _together(len(first), len(two), lags)
     enough = np.flatnonzero(count >= max(OVERLAP * GRID, SHARE * min(len(first), len(two))))
     products, cross, power = (sums[enough] for sums in _sums(first, two))
-    by_trend = _explained(products[:, :TREND, :TREND], cross[:, :TREND])
-    by_all = _explained(products, cross)
+    weights = _weights(products, cross)
+    trend = _weights(products[:, :TREND, :TREND], cross[:, :TREND])
+    by_trend = np.sum(trend * cross[:, :TREND], axis=1)
+    by_all = np.sum(weights * cross, axis=1)
     match = np.zeros(lags.size)
     share = (by_all - by_trend) / np.maximum(power - by_trend, 1e-30)
     match[enough] = np.sqrt(np.clip(share, 0.0, 1.0))
     if two.shape[1] == 1:
-        weights = np.linalg.solve(products, cross[..., None])[..., 0]
         match[enough] *= np.sign(weights[:, TREND])
     return lags, match
 
@@ -194,16 +195,9 @@ def _sums(first: Array, two: Array) -> tuple[Array, Array, Array]:
     return products.transpose(2, 0, 1) + small, cross.T, summed(first**2, there)
 
 
-def _explained(products: Array, cross: Array) -> Array:
-    """How much of the square of a signal columns explain, at each lag."""
-    weights = np.linalg.solve(products, cross[..., None])[..., 0]
-    return np.asarray(np.sum(weights * cross, axis=1))
-
-
-def _beside_trend(values: Array) -> Array:
-    """Columns (n, k) without their constant and slope."""
-    trend, _ = np.linalg.qr(np.column_stack([np.ones(len(values)), np.arange(len(values))]))
-    return np.asarray(values - trend @ (trend.T @ values))
+def _weights(products: Array, cross: Array) -> Array:
+    """The best sum of columns at each lag, (lags, k)."""
+    return np.asarray(np.linalg.solve(products, cross[..., None])[..., 0])
 
 
 def _together(first: int, second: int, lag: NDArray[np.int64] | int) -> NDArray[np.int64] | int:
@@ -219,9 +213,12 @@ def _refined(lags: NDArray[np.int64], match: Array, best: int) -> float:
     return float(lags[best] + (0.5 * (left - right) / bend if bend < 0.0 else 0.0))
 
 
-def _spread(values: Array, rho: float, together: float) -> float:
-    """Standard deviation of the lag, s: the Cramer-Rao bound, at least a tenth of a grid step."""
-    first = _beside_trend(values[:, :1])[:, 0]
+def _spread(first: Array, rho: float, together: float) -> float:
+    """Standard deviation of the lag, s: the Cramer-Rao bound, at least a tenth of a grid step.
+
+    Args:
+      first: (n,) values without their constant and slope.
+    """
     bandwidth = np.std(np.diff(first)) * GRID / max(float(np.std(first)), 1e-30)  # rad/s
     noise = (1.0 - rho**2) / max(rho**2, 1e-6)
     bound = np.sqrt(noise / (max(INDEPENDENT * together, 1.0) * bandwidth**2))
@@ -264,7 +261,7 @@ def _drift(one: Signal, two: Signal, offset: float) -> tuple[float, float, float
 def _local_lag(one: Signal, two: Signal, offset: float, window: Array) -> tuple[float, float]:
     """How much more than `offset` a part is off, s, and its spread; NaN where it does not tell."""
     inside = (one.time >= window[0]) & (one.time <= window[1])
-    first = _beside_trend(one.values[inside, :1])[:, 0]
+    first = detrend(one.values[inside, 0])
     shifts = np.arange(-round(NEAR * GRID), round(NEAR * GRID) + 1)
     match = np.zeros(shifts.size)
     for i, shift in enumerate(shifts):
@@ -272,7 +269,7 @@ def _local_lag(one: Signal, two: Signal, offset: float, window: Array) -> tuple[
         if time[0] < two.time[0] or time[-1] > two.time[-1]:
             continue
         columns = np.column_stack([np.interp(time, two.time, c) for c in two.values.T])
-        columns = _beside_trend(columns)
+        columns = detrend(columns, axis=0)
         fit = columns @ np.linalg.lstsq(columns, first, rcond=None)[0]
         match[i] = float(first @ fit) / max(
             float(np.linalg.norm(first) * np.linalg.norm(fit)), 1e-30
@@ -280,5 +277,5 @@ def _local_lag(one: Signal, two: Signal, offset: float, window: Array) -> tuple[
     best = int(np.argmax(match))
     if match[best] < LEAST or best in (0, shifts.size - 1):
         return np.nan, np.nan
-    spread = _spread(first[:, None], min(float(match[best]), 1.0 - 1e-9), PART)
+    spread = _spread(first, min(float(match[best]), 1.0 - 1e-9), PART)
     return _refined(shifts, match, best) / GRID, spread

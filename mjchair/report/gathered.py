@@ -1,7 +1,7 @@
 """The picture of a gathered study: the readings of all instruments for one motion, on one clock.
 
-In: the trials. Out: a figure with a row for each trial: wheel speeds above, and torque or turning
-rate below.
+In: the trials. Out: a figure with a row for each trial: wheel speeds on the left; torque, turning
+rate or what the wheels' sensors show on the right.
 """
 
 from __future__ import annotations
@@ -135,21 +135,20 @@ def _turning(axes: Axes, trial: GatheredTrial) -> None:
         axes.set_ylabel("turning rate (rad/s)")
         _legend_above(axes)
         return
-    kinds = [k for k in ("_speed", "_angle") if any(n.endswith(k) for n in trial.columns)]
-    for name in (n for n in trial.columns if n.endswith(tuple(kinds[:1]))):
-        wheel = name.removesuffix(kinds[0])
+    spans = [n for n in trial.columns if n.endswith("_speed")]
+    spans = spans or [n for n in trial.columns if n.endswith("_angle")]
+    for name in spans:
+        wheel, kind = name.rsplit("_", 1)
         there = np.isfinite(trial.columns[name])
         axes.plot(
             trial.time[there], trial.columns[name][there], "--" if wheel == "right_wheel" else "-",
             lw=1.0, color=SIDES.get(wheel, SERIES[2]), label=name.replace("_", " "),
         )  # fmt: skip
-        axes.set_ylabel(f"{kinds[0].removeprefix('_')} ({sensor(name).unit})")
-    if kinds:
+        axes.set_ylabel(f"{kind} ({sensor(name).unit})")
+    if spans:
         _legend_above(axes)
 
 
 def _legend_above(axes: Axes) -> None:
     """The legend in one row above the axes, so that it hides no curve."""
-    axes.legend(
-        fontsize=7, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, frameon=False
-    )  # fmt: skip
+    axes.legend(fontsize=7, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, frameon=False)
