@@ -9,7 +9,7 @@ residual. Every later test, fit and score is made of sums of these (bounded.py).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -67,6 +67,26 @@ class System:
     def index(self, columns: Sequence[ColumnId]) -> list[int]:
         """Places of columns."""
         return [self.places[c] for c in columns]
+
+    def of_data(self, k: int, first: int) -> System:
+        """The system of data that show what nuisance `k` changes; without the `first` columns.
+
+        The other nuisances stand in the centre of their priors. Cells are not set.
+        """
+        return replace(
+            self,
+            columns=self.columns[first:],
+            nuisance=self.nuisance - first,
+            G=self.G[:, first:, first:],
+            b=self.G[:, first:, k],
+            c=self.G[:, k, k],
+            back=np.zeros(self.nuisance - first),
+            slow=[
+                [np.column_stack([band[:, 1 + k], band[:, 1 + first :]]) for band in window]
+                for window in self.slow
+            ],
+            cells=[],
+        )
 
 
 def build(
