@@ -56,6 +56,7 @@ def fits(monkeypatch):
     def terms(reduced, hypothesis, share=1.0):
         return tuple(Term(s.effect, {"size": 1.0}, ()) for s in hypothesis.starts)
 
+    monkeypatch.setattr(search.rules, "NOTHING", 0.0)  # no effect is so small that columns hold
     monkeypatch.setattr(search.whole_sizes, "fits", lambda *_: ())
     monkeypatch.setattr(search.whole_sizes, "compared", lambda _, fitted: fitted)
     monkeypatch.setattr(search.open_ended, "with_least_sizes", lambda _, fitted: fitted)
@@ -174,6 +175,26 @@ def test_a_gap_is_laid_to_a_further_effect_only_once_the_first_is_fitted_anew(fi
     assert "motor+rolling" not in {keys for keys, _ in fits.asked}
 
 
+@pytest.mark.parametrize(
+    ("total", "promised", "far", "again"),
+    [
+        (1500.0, 1499.5, 0.0, False),
+        (1500.0, 1498.0, 0.0, True),  # it still promises
+        (1500.0, 1499.5, 2.6, True),  # what is roughly known went far
+        (-4000.0, -4000.0, 0.0, True),  # a large effect
+    ],
+)
+def test_columns_are_made_anew_only_where_that_may_change_a_fit(
+    fits, monkeypatch, total, promised, far, again
+):
+    monkeypatch.setattr(search.rules, "NOTHING", 1.0)
+    first = fit(total, "rolling", promised=promised)
+    first.variant = replace(first.variant, offsets={"mass": far})
+    fits.answers["rolling", "track of rolling"] = anew = fit(total - 0.1, "rolling")
+    assert searching().anew(search.Tried(ONE, first)) is (anew if again else first)
+    assert searching().last_fit(search.Tried(ONE, first)) is anew
+
+
 def motor_brings_nothing(fits, monkeypatch, *, alone, anew, beside):
     """Rolling resistance with a motor that ends at 1104.
 
@@ -263,6 +284,7 @@ def test_a_single_effect_may_be_what_the_search_for_noise_left_over(fits, monkey
             ("rolling", "as given"): fit(1500.0, "rolling"),
             ("rolling", "track of rolling"): fit(1500.0, "rolling"),
             ("motor", "track of motor+rolling"): motor,
+            ("motor", "track of motor"): motor,
         }
     )
     monkeypatch.setattr(

@@ -22,11 +22,21 @@ from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.left_out import held_out, with_terms
 from mjchair.diagnosis.explain.near_fit import NearFit, near_fit
 from mjchair.diagnosis.explain.null_ensemble import confirmed
-from mjchair.diagnosis.explain.screening import FAR, Base, Found, Say, gain, gap_after
+from mjchair.diagnosis.explain.screening import (
+    FAR,
+    Base,
+    Found,
+    Say,
+    gain,
+    gap_after,
+    nuisances_of,
+)
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bounded import Reduced
+from mjchair.diagnosis.fit.column_ids import ColumnId
 from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
 from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.window_states import Track
 from mjchair.errors import MjchairError
 
@@ -462,12 +472,20 @@ class Search:
         """
         keys = set(fewer.keys)
         terms = tuple(t for t in more.variant.terms if t.effect.key in keys)
-        fitted = self._made_anew(replace(more.variant, terms=terms), more.track)
+        start = replace(more.variant, terms=terms)
+        fitted = self._made_anew(start, more.track, columns=nuisances_of(self.base, more))
+        if fitted is None:
+            return
+        exact = self._columns_hold(fitted)
+        if not exact:
+            again = self._made_anew(fitted.variant, fitted.track) or fitted
+            fitted = min(fitted, again, key=attrgetter("total"))
         known = _of(fewer, self.tried)
-        if fitted is not None and (known is None or fitted.total < known.total):
+        if known is None or fitted.total < known.total:
             found = Tried(fewer, fitted)
             self.tried.insert(0, found)
-            self.again.insert(0, found)
+            if not exact:
+                self.again.insert(0, found)
 
     def own_gain(self, chosen: Tried, start: Start) -> float:
         """Chi2 that one effect of the chosen hypothesis brings beside the others."""
@@ -719,6 +737,16 @@ class Search:
         return fitted if again is None else min(fitted, again, key=lambda f: f.total)
 
     def anew(self, tried: Tried) -> Fitted:
+        """The fit with everything made anew around it, where that may change what it says."""
+        return tried.fitted if self._columns_hold(tried.fitted) else self._remade(tried)
+
+    def _columns_hold(self, fitted: Fitted) -> bool:
+        """Whether small effects stand where all columns are as good as they would be anew."""
+        missed = fitted.total - fitted.promised
+        small = rules.columns_hold(gain=gain(self.base, fitted), missed=missed)
+        return small and not _goes_far(fitted)
+
+    def _remade(self, tried: Tried) -> Fitted:
         """The fit with everything made anew around it; the fit itself where that cannot be."""
         hypothesis, first = tried.hypothesis, tried.fitted
         known = _of(hypothesis, self.again)
@@ -733,17 +761,24 @@ class Search:
 
         Sizes that are open upwards have a least one.
         """
-        fitted = whole_sizes.compared(self.base, self.anew(tried))
+        fitted = whole_sizes.compared(self.base, self._remade(tried))
         return open_ended.with_least_sizes(self.base, fitted)
 
-    def _made_anew(self, start: Variant, before: Track, noted: str = "") -> Fitted | None:
+    def _made_anew(
+        self,
+        start: Variant,
+        before: Track,
+        noted: str = "",
+        columns: dict[ColumnId, Column] | None = None,
+    ) -> Fitted | None:
         """The fit from a variant, all columns made there; None: no chair can be so.
 
         Args:
           noted: what the note calls it where that fails; empty: no note.
+          columns: of what is roughly known, to be used instead; None: they are made there too.
         """
         try:
-            return refit(self.base.bench, start, before)
+            return refit(self.base.bench, start, before, columns)
         except (MjchairError, np.linalg.LinAlgError) as error:
             if noted:
                 self._note(f"{noted} was not made anew: {error}")
