@@ -49,7 +49,7 @@ from mjchair.diagnosis.explain.probability import (
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.fit.column_ids import ParameterId
-from mjchair.diagnosis.fit.process import KINDS
+from mjchair.diagnosis.fit.process import KINDS, Part
 from mjchair.diagnosis.fit.system import System
 from mjchair.effects.effect import step
 
@@ -320,6 +320,7 @@ def _noise(bed: Bed, rng: np.random.Generator) -> list[Array]:
             kind.time * math.exp(COLOURS * rng.standard_normal()),
         )
         for p, kind in KINDS.items()
+        if p != Part.PERSON  # its force is not kept with the studies
     }  # fmt: skip
     for b in bed.blocks:
         e = sensor[0][b.channel] * rng.standard_normal(len(b.J))

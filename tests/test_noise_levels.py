@@ -21,6 +21,9 @@ TRUE = {
     Part.SIDE: 0.0,
     Part.YAW_FAST: 0.6,
     Part.YAW_SLOW: 0.1,
+    Part.PERSON: 0.0,
+    Part.WHEEL_TURN: 0.0,
+    Part.CASTER_TURN: 0.0,
 }
 POWER = np.array([[4.0, 4.0, 4.0], [0.5, 1.0, 1.0]])
 
@@ -146,7 +149,10 @@ def test_what_shakes_harder_than_it_can_is_left_in_the_gap():
         bands=np.ones((2, len(EDGES))),
     )
     held = noise_levels.estimate(
-        drawn, first, np.full((2, len(EDGES)), 1e-4), most={Force.FORWARD: 0.7}
+        drawn,
+        first,
+        np.full((2, len(EDGES)), 1e-4),
+        most={Part.DRIVE_FAST: 0.7, Part.DRIVE_SLOW: 0.7, Part.PERSON: 0.0},
     )
     assert held.parts[Part.DRIVE_FAST].max() == pytest.approx(0.7)
     assert held.parts[Part.YAW_FAST].max() > 0.4

@@ -390,7 +390,7 @@ def test_what_a_person_knows_reaches_the_rules_of_the_diagnosis(tmp_path):
     assert not noise_levels.known_parts(plain)
     assert noise.estimate(told)["left_wheel_speed"].source == "study.toml"
     for bad, words in (
-        ("[noise]\nprocess = 3.0\n", "process .* is a table with drive, side or yaw"),
+        ("[noise]\nprocess = 3.0\n", "process .* is a table .drive, side, yaw"),
         ("[noise.process]\ndrift = 1.0\n", "unknown key 'drift'"),
         ("[material]\nforce = 0.0\n", "force is 0.0; it must be positive"),
         ('indoors = "yes"\n', "indoors is 'yes'; it must be true or false"),

@@ -30,14 +30,12 @@ from mjchair.diagnosis.explain.probability import of_any, of_effects, probabilit
 from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import ParameterId
-from mjchair.diagnosis.fit.noise_levels import FORCES as FORCE_NAMES
 from mjchair.diagnosis.fit.nonlinear import Fitted
-from mjchair.diagnosis.fit.process import force_level
+from mjchair.diagnosis.fit.process import NAMED, level
 from mjchair.diagnosis.fit.slow_part import BAND
 from mjchair.diagnosis.material import material
 from mjchair.diagnosis.next_experiment import design, wording
 from mjchair.diagnosis.next_experiment.design import Plan
-from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.result import (
     Candidate,
     Diagnosis,
@@ -157,14 +155,17 @@ def _walls(choice: Choice) -> list[str]:
 
 
 def _process(base: Base) -> dict[str, Estimate]:
-    """Standard deviation of what shakes the chair: drive, side, yaw."""
+    """Standard deviation of what shakes the chair, by the names of [noise.process].
+
+    Of a person, the share of the force that is in no model; only where a person moves.
+    """
     process = base.bench.process
     if process is None:
         return {}
-    units = {Force.FORWARD: "N", Force.LEFTWARD: "N", Force.YAW: "N m"}
     return {
-        name: Estimate(value=force_level(process.levels, force), std=None, unit=units[force])
-        for name, force in FORCE_NAMES.items()
+        name: Estimate(value=level(process.levels, name), std=None, unit=unit)
+        for name, (_, unit) in NAMED.items()
+        if name != "person" or process.person.any()
     }
 
 

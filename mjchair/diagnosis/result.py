@@ -313,7 +313,8 @@ class Diagnosis:
       nearest: the explanation that comes nearest where none is named.
       probability: of every hypothesis; a pair is "a+b". more_missing: whether the effects leave
         something that is no noise. material: the largest missing force, and what matters.
-      process: drive, side and yaw -> standard deviation of what shakes the chair.
+      process: drive, side, yaw, wheel_turn, caster_turn -> standard deviation of what shakes the
+        chair; person -> share of a moving person's force that is in no model.
       terms: the effects with the values that stand in the corrected chair.
       correction: the corrected chair, with what is only roughly known where the fit moved it.
       evidence: for the report. stages: for further work in Python.

@@ -88,10 +88,15 @@ def most(spec: mujoco.MjSpec) -> float:
     known = _remembered(spec)
     if known is not None:
         return known[0]
-    sitting = person(spec)
-    if sitting is None:
+    if person(spec) is None:
         return UNKNOWN * float(_chair(spec).mass)
-    return MORE * (sitting[0].mass + sitting[1].mass)
+    return MORE * rider_mass(spec)
+
+
+def rider_mass(spec: mujoco.MjSpec) -> float:
+    """Mass (kg) of the person on this chair; of a chair of unknown load, the most that may move."""
+    sitting = person(spec)
+    return most(spec) if sitting is None else sitting[0].mass + sitting[1].mass
 
 
 def share(spec: mujoco.MjSpec, mass: float) -> Inertial:

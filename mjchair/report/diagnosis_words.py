@@ -24,6 +24,7 @@ from mjchair.diagnosis.rules import LEVEL, PARTLY, Verdict
 LEAST = 1e-6  # a chance below this is said to be below it
 # what a force may go with that is not known where nothing tells how the chair turns
 TURNING = (Quantity.YAW_RATE, Quantity.HEADING, Quantity.SWIVEL, Quantity.RIGHT_TURN)
+CLEAR = 0.5  # of what shakes the chair forward: a force once a turn of this size is told
 UNSURE = 0.005  # probabilities below this are not named
 
 
@@ -80,13 +81,30 @@ def process_words(diagnosis: Diagnosis) -> str:
     if not process:
         return ""
     names = {"drive": "forward", "side": "sideways", "yaw": "about the vertical"}
+    turns = {
+        "wheel_turn": "once a turn of the rear wheels",
+        "caster_turn": "once a turn of casters",
+    }
+    clear = {n for n in turns if n in process and process[n].value > CLEAR * process["drive"].value}
+    names |= {n: turns[n] for n in clear}
     levels = ", ".join(
         f"{size(e.value)} {e.unit} {names[name]}" for name, e in process.items() if name in names
     )
     return (
         "Between the gap and the noise of the sensors stands what shakes the chair and repeats in "
-        f"no run (joints of the floor, spokes, breathing): {levels}, as these runs show it. A gap "
-        "is what stands out of both."
+        f"no run (joints of the floor, spokes, breathing): {levels}, as these runs show it. "
+        f"{_person_words(diagnosis)}A gap is what stands out of both."
+    )
+
+
+def _person_words(diagnosis: Diagnosis) -> str:
+    """How much of a moving person's force is in no model; nothing where nobody moves."""
+    share_left = diagnosis.process.get("person")
+    if share_left is None:
+        return ""
+    return (
+        f"A person moves on the chair, and {share(share_left.value)} of that person's force is in "
+        "no measured motion and no two strokes alike. "
     )
 
 

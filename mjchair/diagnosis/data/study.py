@@ -51,8 +51,9 @@ class Study:
     Attributes:
       spec: the chair in its scene. runs: in order.
       noise: channel -> standard deviation (SI), where it is known.
-      process: drive (N), side (N), yaw (N m) -> standard deviation of what shakes the chair, where
-        it is known.
+      process: name (as in study.toml) -> standard deviation of what shakes the chair, where it is
+        known: drive, side, wheel_turn, caster_turn (N), yaw (N m); person: share of a moving
+        person's force that is in no model.
       indoors: whether no wind blows. material: force (N) below which nothing matters to the person
         who asks; None: not told.
       torque_measured: whether the torques were measured at push rims; False: they are commands.

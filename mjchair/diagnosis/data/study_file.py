@@ -70,11 +70,17 @@ class TrialEntry(Struct, forbid_unknown_fields=True):
 
 
 class ProcessEntry(Struct, forbid_unknown_fields=True):
-    """[noise.process]: standard deviation of what shakes the chair: N, N, N m."""
+    """[noise.process]: standard deviation of what shakes the chair, N (yaw: N m).
+
+    Of `person`, a share of a moving person's force.
+    """
 
     drive: Positive | None = None
     side: Positive | None = None
     yaw: Positive | None = None
+    person: Positive | None = None
+    wheel_turn: Positive | None = None
+    caster_turn: Positive | None = None
 
     def given(self) -> dict[str, float]:
         """The fields that were given."""
@@ -165,7 +171,7 @@ def _noise(entry: StudyEntry, path: Path) -> tuple[dict[str, float], dict[str, f
     channels, process = {}, ProcessEntry()
     for name, value in entry.noise.items():
         if isinstance(value, ProcessEntry) != (name == "process"):
-            rule = "[noise.process] is a table with drive, side or yaw; a channel has one number"
+            rule = "[noise.process] is a table (drive, side, yaw, ...); a channel has one number"
             raise MjchairError(f"{path}: noise of {name} cannot be read: {rule}")
         if isinstance(value, ProcessEntry):
             process = value

@@ -20,8 +20,8 @@ from mjchair.diagnosis.explain.column_ids import EffectColumn, EffectGroup, Forc
 from mjchair.diagnosis.fit import noise_levels, process
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ColumnId
-from mjchair.diagnosis.fit.noise_levels import FORCES, Levels
-from mjchair.diagnosis.fit.process import Process
+from mjchair.diagnosis.fit.noise_levels import Levels
+from mjchair.diagnosis.fit.process import NAMED, Part, Process
 from mjchair.diagnosis.replay import derivatives
 from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.noise import EDGES
@@ -36,6 +36,10 @@ Array = NDArray[np.float64]
 SPREAD = {Force.FORWARD: 10.0, Force.YAW: 3.0}  # N, N m: prior of a force that goes with something
 SCALE = 0.1  # prior of a sensor's scale, 1
 SHAKES = 0.3  # of the chair's own rolling resistance: what shakes it harder has a cause
+# of a moving person's force, that is in no model: markers on skin tell a centre of mass to some
+# per cent, and strokes of one person differ by about a tenth (assumption)
+UNLIKE = 0.1
+SHAKING = tuple(name for name in NAMED if name != "person")  # what shakes a chair
 HUSH = 0.05  # of a level: nearly nothing
 SIZES = 5.0  # sizes worth finding: prior of the best hypothesis
 
@@ -85,7 +89,7 @@ def loudness(bench: Bench) -> float:
     """Power of what shakes the chair, over the most that is believed of it; its loudest force."""
     assert bench.process is not None
     most, levels = _most(bench.simulator), bench.process.levels
-    return max((process.force_level(levels, f) / most[f]) ** 2 for f in FORCES.values())
+    return max((process.level(levels, name) / most[NAMED[name][0][0]]) ** 2 for name in SHAKING)
 
 
 def hushed(bench: Bench) -> Bench:
@@ -93,7 +97,7 @@ def hushed(bench: Bench) -> Bench:
     assert bench.process is not None
     given = noise_levels.known_parts(bench.simulator.study)
     levels = {
-        part: level if part in given else HUSH * level
+        part: level if part in given or part == Part.PERSON else HUSH * level
         for part, level in bench.process.levels.items()
     }
     return replace(bench, process=replace(bench.process, levels=levels))
@@ -127,15 +131,16 @@ def _estimated(
     return Bench(simulator, noise, bench.nuisances, process), how_far
 
 
-def _most(simulator: WindowSimulator) -> dict[Force, float]:
-    """The largest levels of what shakes a chair: shares of its own rolling resistance, N or N m."""
+def _most(simulator: WindowSimulator) -> dict[Part, float]:
+    """The largest levels of what shakes a chair: shares of its own rolling resistance, N or N m.
+
+    Of what a moving person does besides, a share of that person's force.
+    """
     own = own_resistance(simulator.study.spec)
     half = 0.5 * rear_axle(simulator.base).track
-    return {
-        Force.FORWARD: SHAKES * own,
-        Force.LEFTWARD: own,
-        Force.YAW: SHAKES * own * half,
-    }
+    drive = SHAKES * own
+    most = dict.fromkeys(NAMED, drive) | {"side": own, "yaw": drive * half, "person": UNLIKE}
+    return {part: most[name] for name, (parts, _) in NAMED.items() for part in parts}
 
 
 def _smooth(

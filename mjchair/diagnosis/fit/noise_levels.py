@@ -22,7 +22,7 @@ from scipy.linalg import cho_factor, cho_solve
 from mjchair.diagnosis.data.study import Study
 from mjchair.diagnosis.fit.column_ids import ColumnId
 from mjchair.diagnosis.fit.elimination import state_columns
-from mjchair.diagnosis.fit.process import KINDS, Part, Process
+from mjchair.diagnosis.fit.process import KINDS, NAMED, SHAKEN, Part, Process
 from mjchair.diagnosis.fit.whitening import Whitener
 from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.noise import EDGES, Noise
@@ -38,7 +38,6 @@ LEAST_HZ = 1.5  # below it a chair's effects show, so a sensor's power there is 
 FAR = 4.0  # ratio of a run's level (as power) to the median run's: beyond is an event, no level
 FLAT = 4.0  # power of a sensor in its slowest band over that in the next, at most
 OWN = 6.0  # numbers that tell a run's level as well as all other runs together do
-FORCES = {"drive": Force.FORWARD, "side": Force.LEFTWARD, "yaw": Force.YAW}  # as in study.toml
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +45,8 @@ class Levels:
     """What is estimated.
 
     Attributes:
-      parts: part -> (runs,) standard deviations, N or N m. wobbles: channel -> amplitude, SI.
+      parts: part -> (runs,) standard deviations, N or N m (1 of PERSON).
+      wobbles: channel -> amplitude, SI.
       bands: (channels, bands) power over that of the first guess.
     """
 
@@ -97,7 +97,7 @@ def windows_of(
         both = np.concatenate([miss[:, :, None], stacked, free], axis=2)
         white = whitener(i, np.nan_to_num(both, copy=False, posinf=0.0, neginf=0.0))
         p = stacked.shape[2]
-        members = {f: process.members(i, f) for f in FORCES.values()}
+        members = {f: process.members(i, f) for f in SHAKEN}
         frequency = whitener.frequency[i]
         out.append(
             WindowColumns(
@@ -151,15 +151,15 @@ def estimate(
     least: Array,
     fixed: frozenset[Part] = frozenset(),
     steps: int = STEPS,
-    most: Mapping[Force, float] | None = None,
+    most: Mapping[Part, float] | None = None,
 ) -> Levels:
     """The most probable levels.
 
     Args:
       windows: that may be fitted to. first: where to begin.
       least: (channels, bands), the least power of a sensor, over that of the first guess.
-      fixed: parts whose level is known. most: force -> the largest level of a part of it, N or
-        N m; None: any. What shakes a chair harder is something missing.
+      fixed: parts whose level is known. most: part -> its largest level, N or N m (1 of PERSON);
+        None: any. What shakes a chair harder is something missing.
     """
     levels = first
     for _ in range(steps):
@@ -169,10 +169,10 @@ def estimate(
     return levels
 
 
-def _within(levels: Levels, most: Mapping[Force, float], fixed: frozenset[Part]) -> Levels:
+def _within(levels: Levels, most: Mapping[Part, float], fixed: frozenset[Part]) -> Levels:
     """The levels, none larger than what noise can be."""
     parts = {
-        part: level if part in fixed else np.minimum(level, most.get(KINDS[part].force, np.inf))
+        part: level if part in fixed else np.minimum(level, most.get(part, np.inf))
         for part, level in levels.parts.items()
     }
     bands = levels.bands.copy()
@@ -353,11 +353,10 @@ def least_powers(noise: Mapping[str, Noise], channels: Sequence[str], given: boo
 
 
 def known_parts(study: Study) -> dict[Part, float]:
-    """Levels of parts that study.toml gives, N or N m: half of a force's power is slow."""
-    out = {}
-    for name, force in FORCES.items():
-        given = study.process.get(name)
-        if given is not None:
-            parts = [p for p, kind in KINDS.items() if kind.force == force]
-            out.update({p: given / len(parts) ** 0.5 for p in parts})
-    return out
+    """Levels of parts that study.toml gives, N, N m or 1: half of a force's power is slow."""
+    return {
+        part: given / len(parts) ** 0.5
+        for name, (parts, _) in NAMED.items()
+        for part in parts
+        if (given := study.process.get(name)) is not None
+    }

@@ -18,7 +18,6 @@ from mjchair.diagnosis.data.windows import Window
 from mjchair.diagnosis.fit import process
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import RoughlyKnown
-from mjchair.diagnosis.fit.noise_levels import FORCES
 from mjchair.diagnosis.fit.nonlinear import Fitted, moved
 from mjchair.diagnosis.fit.process import Process
 from mjchair.diagnosis.fit.variant import Variant
@@ -209,7 +208,7 @@ class Rehearsal:
     @cached_property
     def disturbed(self) -> tuple[list[Pulse], list[Array]]:
         """Pulses of the forces that disturb the chair, in every window, and their answers."""
-        asked = [p for p in pulses(self.simulator) if p.force in FORCES.values()]
+        asked = [p for p in pulses(self.simulator) if p.force in process.SHAKEN]
         return asked, pulse_answers(self.simulator, self.track, asked, self.chair.variant.edit)
 
     def _shaken(self, bench: Bench, known: Process) -> Process:

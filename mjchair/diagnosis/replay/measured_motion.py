@@ -49,6 +49,11 @@ class Motion:
         inside = np.clip(time, self.time[0], self.time[-1])
         return np.asarray(self._spline(inside) + (time - inside) * self._spline(inside, 1))
 
+    def acceleration_at(self, time: Array) -> Array:
+        """Acceleration at times (s), its unit/s^2; 0 before and after the motion."""
+        there = (time >= self.time[0]) & (time <= self.time[-1])
+        return np.asarray(np.where(there, self._spline(time, 2), 0.0))
+
     def start(self, time: float) -> tuple[float, float]:
         """Place, and speed (1/s), at a time (s)."""
         inside = float(np.clip(time, self.time[0], self.time[-1]))
