@@ -43,6 +43,11 @@ class Hypothesis:
         return tuple(sorted(s.effect.key for s in self.starts))
 
     @property
+    def label(self) -> str:
+        """Its effects, as a line for a reader names them."""
+        return " and ".join(self.keys)
+
+    @property
     def columns(self) -> list[EffectColumn]:
         """The columns of all effects."""
         return [c for s in self.starts for c in s.columns]
