@@ -12,6 +12,7 @@ from unittest import mock
 import numpy as np
 import pytest
 
+from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import (
     alternatives,
     backward_elimination,
@@ -72,6 +73,7 @@ def fits(monkeypatch):
     def terms(reduced, hypothesis, share=1.0):
         return tuple(Term(s.effect, {"size": 1.0}, ()) for s in hypothesis.starts)
 
+    monkeypatch.setattr(rules, "NOTHING", 0.0)  # no effect is so small that columns hold
     monkeypatch.setattr(whole_sizes, "fits", lambda *_: ())
     monkeypatch.setattr(whole_sizes, "compared", lambda _, fitted: fitted)
     monkeypatch.setattr(open_ended, "with_least_sizes", lambda _, fitted: fitted)
@@ -198,6 +200,26 @@ def test_a_gap_is_laid_to_a_further_effect_only_once_the_first_is_fitted_anew(fi
     assert "motor+rolling" not in {keys for keys, _ in fits.asked}
 
 
+@pytest.mark.parametrize(
+    ("total", "promised", "far", "again"),
+    [
+        (1500.0, 1499.5, 0.0, False),
+        (1500.0, 1498.0, 0.0, True),  # it still promises
+        (1500.0, 1499.5, 2.6, True),  # what is roughly known went far
+        (-4000.0, -4000.0, 0.0, True),  # a large effect
+    ],
+)
+def test_columns_are_made_anew_only_where_that_may_change_a_fit(
+    fits, monkeypatch, total, promised, far, again
+):
+    monkeypatch.setattr(rules, "NOTHING", 1.0)
+    first = fit(total, "rolling", promised=promised)
+    first.variant = replace(first.variant, offsets={"mass": far})
+    fits.answers["rolling", "track of rolling"] = anew = fit(total - 0.1, "rolling")
+    assert searching().anew(Tried(ONE, first)) is (anew if again else first)
+    assert searching().last_fit(Tried(ONE, first)) is anew
+
+
 def motor_brings_nothing(fits, monkeypatch, *, alone, anew, beside):
     """Rolling resistance with a motor that ends at 1104.
 
@@ -289,6 +311,7 @@ def test_a_single_effect_may_be_what_the_search_for_noise_left_over(fits, monkey
             ("rolling", "as given"): fit(1500.0, "rolling"),
             ("rolling", "track of rolling"): fit(1500.0, "rolling"),
             ("motor", "track of motor+rolling"): motor,
+            ("motor", "track of motor"): motor,
         }
     )
     monkeypatch.setattr(
@@ -442,9 +465,8 @@ def test_an_effect_of_a_whole_size_may_be_the_better_one(fits, monkeypatch, tota
     assert (found.fitted is whole and not left.exists) == (total < 1500.0)
     monkeypatch.setattr(whole_sizes, "shimmies", lambda _: shimmies)
     closed = (here[0], SimpleNamespace(exists=False))
-    stays = (
-        alternatives.or_whole(looking, closed) is closed
-    )  # where nothing asks for one, none is looked for
+    # where nothing asks for one, none is looked for
+    stays = alternatives.or_whole(looking, closed) is closed
     assert stays == (not shimmies or total > 1500.0)
 
 

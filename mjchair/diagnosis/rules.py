@@ -52,6 +52,7 @@ CLEAR = 20.0  # standard deviations beyond which no null is asked for (assumptio
 # of the gain of all: columns that are made anew, again and again around one fit, change its chi2 by
 # as much (53 of 331 000 was seen), so a test that shows less shows nothing
 ROUNDING = 2e-4
+NOTHING = 1.0  # chi2 that decides nothing
 SMALL_GAP = 2.0  # rms of the residual over the noise up to which a gap may be none that matters
 SHOWS = 2.0  # standard deviations of the whole residual: less is no more than noise
 CERTAIN = 10.0  # standard errors beyond which an effect is named whatever its size
@@ -385,6 +386,15 @@ def is_stuck(*, total: float, promised: float) -> bool:
     Then the columns of what is only roughly known, which are made once, are too old.
     """
     return total - promised > RIVAL_CHI2
+
+
+def columns_hold(*, gain: float, missed: float) -> bool:
+    """Whether columns that were made around a chair without effects are as good as new ones.
+
+    Args:
+      gain: chi2 that the effects bring. missed: chi2 that the fit's own linear step still promises.
+    """
+    return ROUNDING * gain < NOTHING and missed < NOTHING
 
 
 def reaches(*, total: float, promised: float, gain: float) -> bool:

@@ -15,12 +15,11 @@ from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import hypotheses, whole_sizes
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Tried
-from mjchair.diagnosis.explain.fits import Fits, believable
-from mjchair.diagnosis.explain.screening import FAR, Base
+from mjchair.diagnosis.explain.fits import Fits, believable, goes_far
+from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.explain.shortlist import WithGap, best_of, better
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bounded import Reduced
-from mjchair.diagnosis.fit.nonlinear import Fitted
 
 APART = 10.0  # times the chi2 of most windows: there a chair went another way (assumption)
 NARROW = 1.0  # standard deviations: a wall for what may have taken an effect for itself
@@ -110,11 +109,6 @@ def left_over(base: Base) -> list[Start]:
     if known is None:
         return []
     return [s for s in known.starts if known.fitted.sigmas[s.effect.key] > rules.SIGMAS]
-
-
-def goes_far(fitted: Fitted) -> bool:
-    """Whether anything that is only roughly known is far from what it is known to be."""
-    return any(abs(by) >= FAR for by in fitted.variant.offsets.values())
 
 
 def _most_windows(base: Base) -> list[int]:

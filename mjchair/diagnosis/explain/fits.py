@@ -20,7 +20,15 @@ from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.multistart import MultiStart, made_anew
 from mjchair.diagnosis.explain.near_fit import NearFit, near_fit
-from mjchair.diagnosis.explain.screening import Base, Found, Say, gain, gap_after
+from mjchair.diagnosis.explain.screening import (
+    FAR,
+    Base,
+    Found,
+    Say,
+    gain,
+    gap_after,
+    nuisances_of,
+)
 from mjchair.diagnosis.fit.nonlinear import Fitted
 
 
@@ -129,18 +137,39 @@ class Fits:
         """
         keys = set(fewer.keys)
         terms = tuple(t for t in more.variant.terms if t.effect.key in keys)
-        fitted = made_anew(self.base.bench, replace(more.variant, terms=terms), more.track)
-        if fitted is not None:
-            self.keep_better(Tried(fewer, fitted))
+        start, columns = replace(more.variant, terms=terms), nuisances_of(self.base, more)
+        fitted = made_anew(self.base.bench, start, more.track, columns)
+        if fitted is None:
+            return
+        exact = self._columns_hold(fitted)
+        if not exact:
+            again = made_anew(self.base.bench, fitted.variant, fitted.track) or fitted
+            fitted = min(fitted, again, key=attrgetter("total"))
+        self.keep_better(Tried(fewer, fitted), anew=not exact)
 
-    def keep_better(self, made: Tried) -> None:
-        """Keep a fit that was made anew elsewhere, unless a better one of its effects is known."""
+    def keep_better(self, made: Tried, anew: bool = True) -> None:
+        """Keep a fit that was made elsewhere, unless a better one of its effects is known.
+
+        Args:
+          anew: whether all its columns were made around it.
+        """
         known = _of(made.hypothesis, self.tried)
         if known is None or made.fitted.total < known.total:
             self.tried.insert(0, made)
-            self.again.insert(0, made)
+            if anew:
+                self.again.insert(0, made)
 
     def anew(self, tried: Tried) -> Fitted:
+        """The fit with everything made anew around it, where that may change what it says."""
+        return tried.fitted if self._columns_hold(tried.fitted) else self._remade(tried)
+
+    def _columns_hold(self, fitted: Fitted) -> bool:
+        """Whether small effects stand where all columns are as good as they would be anew."""
+        missed = fitted.total - fitted.promised
+        small = rules.columns_hold(gain=gain(self.base, fitted), missed=missed)
+        return small and not goes_far(fitted)
+
+    def _remade(self, tried: Tried) -> Fitted:
         """The fit with everything made anew around it; the fit itself where that cannot be."""
         hypothesis, first = tried.hypothesis, tried.fitted
         known = _of(hypothesis, self.again)
@@ -149,7 +178,7 @@ class Fits:
             def note(why: str) -> None:
                 self._note(f"the fit of {hypothesis.label} was not made anew: {why}")
 
-            known = made_anew(self.base.bench, first.variant, first.track, note) or first
+            known = made_anew(self.base.bench, first.variant, first.track, note=note) or first
             self.again.append(Tried(hypothesis, known))
         return known
 
@@ -158,7 +187,7 @@ class Fits:
 
         Sizes that are open upwards have a least one.
         """
-        fitted = whole_sizes.compared(self.base, self.anew(tried))
+        fitted = whole_sizes.compared(self.base, self._remade(tried))
         return open_ended.with_least_sizes(self.base, fitted)
 
     def gap_after(self, fitted: Fitted) -> Gap:
@@ -173,6 +202,11 @@ class Fits:
 def _of(hypothesis: Hypothesis, fits: Sequence[Tried]) -> Fitted | None:
     """The fit of a hypothesis among others; None: it is not there."""
     return next((t.fitted for t in fits if t.hypothesis.starts == hypothesis.starts), None)
+
+
+def goes_far(fitted: Fitted) -> bool:
+    """Whether anything that is only roughly known is far from what it is known to be."""
+    return any(abs(by) >= FAR for by in fitted.variant.offsets.values())
 
 
 def believable(fitted: Fitted) -> bool:

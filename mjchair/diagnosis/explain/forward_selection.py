@@ -9,7 +9,7 @@ from __future__ import annotations
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import alternatives
 from mjchair.diagnosis.explain.choice import Tried
-from mjchair.diagnosis.explain.fits import Fits
+from mjchair.diagnosis.explain.fits import Fits, goes_far
 from mjchair.diagnosis.explain.left_out import held_out, with_terms
 from mjchair.diagnosis.explain.screening import gain
 from mjchair.diagnosis.explain.shortlist import (
@@ -53,7 +53,7 @@ def grown(fits: Fits) -> WithGap | None:
 
 def _promises(fits: Fits) -> bool:
     """Whether any effect may bring anything, alone or beside those that were found before."""
-    known = fits.base.found is not None or alternatives.goes_far(fits.base.plain)
+    known = fits.base.found is not None or goes_far(fits.base.plain)
     return known or best_single(fits) is not None
 
 

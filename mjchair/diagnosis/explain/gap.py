@@ -10,11 +10,11 @@ the tests have (max-T), at 1 % for the family.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import chdtrc, ndtri
 
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain.column_ids import (
@@ -71,6 +71,7 @@ class Gap:
     Attributes:
       tests: largest first. p: of the family. exists: whether there is a gap worth naming.
       excess: chi2 of the slow part above what noise gives. excess_std: its standard deviation.
+      drawn: (draws,) the least p of the effect and force tests where there is no gap.
     """
 
     tests: list[Test]
@@ -78,6 +79,7 @@ class Gap:
     exists: bool
     excess: float
     excess_std: float
+    drawn: Array = field(default_factory=lambda: np.ones(DRAWS))
 
 
 def groups(columns: Sequence[ColumnId]) -> dict[Group, list[int]]:
@@ -106,7 +108,6 @@ def test_gap(
     windows: Sequence[int],
     skip: Sequence[str] = (),
     gain: float = 0.0,
-    null: Mapping[Subject, float] | None = None,
     seed: int = 0,
 ) -> Gap:
     """Test what is left.
@@ -115,34 +116,77 @@ def test_gap(
       system: with everything that is accepted eliminated. windows: that are tested.
       skip: effects that are in already.
       gain: chi2 that these bring.
-      null: statistics that a chair shows which lacks nothing, by their subjects; None: only noise.
     """
-    null = null or {}
     reduced = bounded.reduce(system, windows)
-    tested = {
+    tested = _tested(reduced, skip)
+    tests = [_test(group, *whole(reduced, which)) for group, which in tested.items()]
+    mine = set(windows)
+    total = sum(c.total for i, c in enumerate(system.cells) if i in mine)
+    dof = sum(c.total_dof for i, c in enumerate(system.cells) if i in mine)
+    drawn = _drawn(reduced, list(tested.values()), seed) if tests else np.ones(DRAWS)
+    return _judged(
+        Gap(
+            tests=[*tests, *_cell_tests(bench, system, windows)],
+            p=1.0,
+            exists=False,
+            excess=total - dof,
+            excess_std=float(np.sqrt(2.0 * dof)),
+            drawn=drawn,
+        ),
+        gain,
+    )
+
+
+def above(gap: Gap, null: Mapping[Subject, float], gain: float) -> Gap:
+    """The gap once every test is less by what a chair shows that lacks nothing.
+
+    Args:
+      null: that chair's statistics. gain: chi2 that the effects bring which are in.
+    """
+    tests = [_test(t.subject, _less(t.statistic, null.get(t.subject)), t.dof) for t in gap.tests]
+    return _judged(replace(gap, tests=tests), gain)
+
+
+def _less(statistic: float, null: float | None) -> float:
+    """A statistic without what its null shows: at most the roots of both add up."""
+    if null is None:
+        return statistic
+    both = np.sqrt(np.maximum([statistic, null], 0.0))
+    return max(float(both[0] - both[1]), 0.0) ** 2
+
+
+def _judged(gap: Gap, gain: float) -> Gap:
+    """The gap with what its tests say together."""
+    cells = [t.p for t in gap.tests if isinstance(t.subject, Cell)]
+    others = [t.p for t in gap.tests if not isinstance(t.subject, Cell)]
+    family = _of_family(min(others), gap.drawn) if others else 1.0
+    worst = min(cells, default=1.0)
+    p = min(1.0, 2.0 * min(family, 1.0 - (1.0 - worst) ** max(len(cells), 1)))
+    sigmas = max((t.sigmas for t in gap.tests), default=0.0)
+    ordered = sorted(gap.tests, key=lambda t: -t.sigmas)
+    return replace(gap, tests=ordered, p=p, exists=rules.gap_exists(p, sigmas, gain))
+
+
+def statistics(
+    bench: Bench, system: System, windows: Sequence[int], skip: Sequence[str] = ()
+) -> dict[Subject, float]:
+    """What every test of `test_gap` shows, chi2; the arguments are the same."""
+    reduced = bounded.reduce(system, windows)
+    shown: dict[Subject, float] = {
+        group: whole(reduced, which)[0] for group, which in _tested(reduced, skip).items()
+    }
+    cells = _cell_tests(bench, system, windows)
+    return shown | {t.subject: t.statistic for t in cells}
+
+
+def _tested(reduced: Reduced, skip: Sequence[str]) -> dict[Group, list[int]]:
+    """The groups of columns that are tested, of which the data tell anything."""
+    return {
         group: which
         for group, which in groups(reduced.columns).items()
         if not (isinstance(group, EffectGroup) and group.effect in skip)
         and _visible(reduced, which)
     }
-    tests = [_test(group, *whole(reduced, which), null) for group, which in tested.items()]
-    family = _family(reduced, list(tested.values()), tests, seed) if tests else 1.0
-    cells = _cell_tests(bench, system, windows, null)
-    worst = min((t.p for t in cells), default=1.0)
-    p = min(1.0, 2.0 * min(family, 1.0 - (1.0 - worst) ** max(len(cells), 1)))
-    sigmas = max((t.sigmas for t in (*tests, *cells)), default=0.0)
-    mine = set(windows)
-    total = sum(c.total for i, c in enumerate(system.cells) if i in mine)
-    dof = sum(c.total_dof for i, c in enumerate(system.cells) if i in mine)
-    ordered = sorted([*tests, *cells], key=lambda t: -t.sigmas)
-    exists = rules.gap_exists(p, sigmas, gain)
-    return Gap(
-        tests=ordered,
-        p=p,
-        exists=exists,
-        excess=total - dof,
-        excess_std=float(np.sqrt(2.0 * dof)),
-    )
 
 
 def forces_left(gap: Gap) -> list[tuple[ForceGroup, float]]:
@@ -154,22 +198,16 @@ def _visible(reduced: Reduced, which: Sequence[int]) -> bool:
     return bool((np.diag(reduced.G)[list(which)] > 1e-6).any())
 
 
-def _test(subject: Subject, statistic: float, dof: float, null: Mapping[Subject, float]) -> Test:
-    """A test, once what its null shows is taken off: at most the roots of both add up."""
-    if subject in null:
-        both = np.sqrt(np.maximum([statistic, null[subject]], 0.0))
-        statistic = max(float(both[0] - both[1]), 0.0) ** 2
-    p = float(stats.chi2.sf(statistic, max(dof, 1.0)))
-    sigmas = float(stats.norm.isf(max(p, 1e-300) / 2.0)) if p < 1.0 else 0.0
+def _test(subject: Subject, statistic: float, dof: float) -> Test:
+    p = float(chdtrc(max(dof, 1.0), statistic))
+    sigmas = -float(ndtri(max(p, 1e-300) / 2.0)) if p < 1.0 else 0.0
     if p < 1e-290:
         sigmas = float(np.sqrt(max(statistic - dof, 0.0)))
     return Test(subject, statistic, dof, p, sigmas)
 
 
-def _family(
-    reduced: Reduced, tested: Sequence[list[int]], tests: Sequence[Test], seed: int
-) -> float:
-    """p of the smallest p among the effect and force tests, from draws with their correlations."""
+def _drawn(reduced: Reduced, tested: Sequence[list[int]], seed: int) -> Array:
+    """The least p (draws,) among the effect and force tests, with their correlations."""
     rng = np.random.default_rng(seed)
     scale = np.sqrt(np.maximum(np.diag(reduced.G), 1e-12))
     values, vectors = np.linalg.eigh(reduced.G / np.outer(scale, scale))
@@ -182,8 +220,12 @@ def _family(
         keep = w > 1e-4
         along = v[:, keep].T @ draws[which]
         drawn = (along**2 / w[keep][:, None]).sum(axis=0)
-        least = np.minimum(least, stats.chi2.sf(drawn, max(keep.sum(), 1)))
-    smallest = min(t.p for t in tests)
+        least = np.minimum(least, chdtrc(max(keep.sum(), 1), drawn))
+    return least
+
+
+def _of_family(smallest: float, least: Array) -> float:
+    """p of the smallest p of a family whose least p without a gap were drawn (draws,)."""
     below = float((least <= smallest).mean())
     if below > 0.0:
         return below
@@ -191,9 +233,7 @@ def _family(
     return float(min(1.0 / DRAWS, effective * smallest))
 
 
-def _cell_tests(
-    bench: Bench, system: System, windows: Sequence[int], null: Mapping[Subject, float]
-) -> list[Test]:
+def _cell_tests(bench: Bench, system: System, windows: Sequence[int]) -> list[Test]:
     out = []
     channels = bench.simulator.channels
     for i in windows:
@@ -203,5 +243,5 @@ def _cell_tests(
             dof = system.cells[i].dof[k]
             if dof >= 1.0:
                 cell = Cell(channel, name, w.first, w.last)
-                out.append(_test(cell, system.cells[i].chi2[k], dof, null))
+                out.append(_test(cell, system.cells[i].chi2[k], dof))
     return out

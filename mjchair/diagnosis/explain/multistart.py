@@ -18,8 +18,10 @@ from mjchair.diagnosis.explain.near_fit import NearFit
 from mjchair.diagnosis.explain.screening import Base, Say, gain, silent
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
+from mjchair.diagnosis.fit.column_ids import ColumnId
 from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
 from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.window_states import Track
 from mjchair.errors import MjchairError
 
@@ -171,14 +173,21 @@ class MultiStart:
         return fitted if again is None else min(fitted, again, key=attrgetter("total"))
 
 
-def made_anew(bench: Bench, start: Variant, before: Track, note: Say = silent) -> Fitted | None:
+def made_anew(
+    bench: Bench,
+    start: Variant,
+    before: Track,
+    columns: dict[ColumnId, Column] | None = None,
+    note: Say = silent,
+) -> Fitted | None:
     """The fit from a variant, all columns made there; None: no chair can be so.
 
     Args:
+      columns: of what is roughly known, to be used instead; None: they are made there too.
       note: is called with the reason where no chair can be so.
     """
     try:
-        return refit(bench, start, before)
+        return refit(bench, start, before, columns)
     except (MjchairError, np.linalg.LinAlgError) as error:
         note(str(error))
         return None

@@ -9,7 +9,7 @@ caster that turns over answers to all of these; a gap that is no larger is none.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import mujoco
@@ -17,12 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import gap as gaps
 from mjchair.diagnosis.explain.gap import Gap, Subject
-from mjchair.diagnosis.explain.screening import Base, gap_after
+from mjchair.diagnosis.explain.screening import Base, gain, tested
 from mjchair.diagnosis.fit import bounded
-from mjchair.diagnosis.fit.column_ids import RoughlyKnown
+from mjchair.diagnosis.fit.column_ids import ColumnId, Otherwise, RoughlyKnown
 from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.replay.derivatives import Column
+from mjchair.diagnosis.replay.sampling import residual
 from mjchair.diagnosis.replay.simulator import Job
 from mjchair.errors import MjchairError
 
@@ -38,26 +40,41 @@ def confirmed(base: Base, fitted: Fitted, gap: Gap, seed: int = 0) -> Gap:
     """The gap that a fit leaves above what the ensemble shows; the gap itself where it is clear.
 
     Args:
-      gap: that `gap_after` says of the fit. seed: of what is drawn.
+      gap: that `screening.gap_after` says of the fit. seed: of what is drawn.
     """
     if not gap.exists or not rules.may_be_of_the_null(gap.tests[0].sigmas):
         return gap
-    shown: dict[Subject, float] = {}
-    for answer in _answers(base, fitted, np.random.default_rng(seed)):
-        if not all(np.isfinite(window).all() for window in answer):
-            continue  # it does not simulate
-        for test in _shown(base, fitted, answer).tests:
-            shown[test.subject] = max(test.statistic, shown.get(test.subject, 0.0))
-    return gap_after(base, fitted, shown)
+    answers = [
+        answer
+        for answer in _answers(base, fitted, np.random.default_rng(seed))
+        if all(np.isfinite(window).all() for window in answer)  # else it does not simulate
+    ]
+    return gaps.above(gap, _shown(base, fitted, answers), gain(base, fitted))
 
 
-def _shown(base: Base, fitted: Fitted, answer: list[Array]) -> Gap:
-    """The gap test of data that are off the fit by an answer, (rows, channels) a window."""
-    simulator = base.bench.simulator
-    seen = [simulator.measured(w) - a for w, a in zip(simulator.windows, answer, strict=True)]
-    track = replace(fitted.track, predicted=seen)
-    variant = replace(fitted.variant, offsets={})  # a difference begins from no prior
-    return gap_after(base, replace(fitted, track=track, variant=variant))
+def _shown(base: Base, fitted: Fitted, answers: Sequence[Column]) -> dict[Subject, float]:
+    """The most that data which are off the fit by an answer show in every test.
+
+    Args:
+      answers: (rows, channels) a window.
+    """
+    if not answers:
+        return {}
+    channels = base.bench.simulator.channels
+    columns: dict[ColumnId, Column] = {
+        Otherwise(k): [residual(a, np.zeros_like(a), channels) for a in answer]
+        for k, answer in enumerate(answers)
+    }
+    every, windows = tested(base, fitted, columns)
+    skip = [t.effect.key for t in fitted.variant.terms]
+    most: dict[Subject, float] = {}
+    for k in range(len(columns)):
+        system = every.of_data(k, len(columns))
+        step = bounded.solve(system, base.bench.windows, [])[0][: system.nuisance]
+        system.set_cells(step)
+        for subject, chi2 in gaps.statistics(base.bench, system, windows, skip).items():
+            most[subject] = max(chi2, most.get(subject, 0.0))
+    return most
 
 
 def _answers(base: Base, fitted: Fitted, rng: np.random.Generator) -> Iterator[list[Array]]:

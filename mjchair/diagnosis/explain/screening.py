@@ -17,7 +17,7 @@ from mjchair.diagnosis.data.windows import calm
 from mjchair.diagnosis.explain import candidates, hypotheses, missing_force, noise_shown
 from mjchair.diagnosis.explain import gap as gaps
 from mjchair.diagnosis.explain.candidates import Around, Start
-from mjchair.diagnosis.explain.gap import Gap, Subject
+from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
@@ -226,11 +226,18 @@ def effects_of(base: Base, fitted: Fitted) -> dict[ColumnId, Column]:
     return {c: column for c, column in fitted.columns.items() if c not in base.nuisances}
 
 
-def system_around(base: Base, bench: Bench, fitted: Fitted) -> System:
-    """All columns around a fit whose effects are free, with the noise of a bench."""
-    count = len(fitted.columns)
-    columns = {**fitted.columns, **base.columns}
-    free = count - len(base.nuisances)
+def system_around(
+    base: Base, bench: Bench, fitted: Fitted, first: Mapping[ColumnId, Column] | None = None
+) -> System:
+    """All columns around a fit whose effects are free, with the noise of a bench.
+
+    Args:
+      first: nuisances that stand before all others.
+    """
+    before = first or {}
+    count = len(before) + len(fitted.columns)
+    columns = {**before, **fitted.columns, **base.columns}
+    free = len(fitted.columns) - len(base.nuisances)
     return bench.system(fitted.track, columns, count, fitted.variant, free=free)
 
 
@@ -245,8 +252,17 @@ def reaches(base: Base, fitted: Fitted) -> bool:
     return rules.reaches(total=fitted.total, promised=fitted.promised, gain=gained)
 
 
-def gap_after(base: Base, fitted: Fitted, null: Mapping[Subject, float] | None = None) -> Gap:
-    """Test what a fit leaves, with its own parameters free.
+def gap_after(base: Base, fitted: Fitted) -> Gap:
+    """Test what a fit leaves, with its own parameters free where it reaches what it promises."""
+    system, windows = tested(base, fitted)
+    keys = [t.effect.key for t in fitted.variant.terms]
+    return gaps.test_gap(base.bench, system, windows, keys, gain(base, fitted))
+
+
+def tested(
+    base: Base, fitted: Fitted, first: Mapping[ColumnId, Column] | None = None
+) -> tuple[System, list[int]]:
+    """The system, and its windows, by which what a fit leaves is tested.
 
     A caster that shimmies hangs on so little that no fit leaves noise alone there. Once an effect
     is in that makes it shimmy, only the other windows tell of what is missing besides. Where a fit
@@ -254,16 +270,14 @@ def gap_after(base: Base, fitted: Fitted, null: Mapping[Subject, float] | None =
     slope and a toe together were laid to a wind, of a size that no wind can have.
 
     Args:
-      null: statistics that a chair shows which lacks nothing; None: only noise.
+      first: nuisances that stand before all others.
     """
     bench, terms = base.bench, fitted.variant.terms
     if reaches(base, fitted):
-        system = system_around(base, bench, fitted)
+        system = system_around(base, bench, fitted, first)
     else:
-        nuisances = nuisances_of(base, fitted)
+        nuisances = {**(first or {}), **nuisances_of(base, fitted)}
         every = {**nuisances, **base.columns}
         system = bench.system(fitted.track, every, len(nuisances), fitted.variant)
     made = any(p.whole for term in terms for _, p in term.parameters)
-    windows = calm(bench.simulator.windows, bench.windows) if made else bench.windows.tolist()
-    keys = [t.effect.key for t in terms]
-    return gaps.test_gap(bench, system, windows, keys, gain(base, fitted), null)
+    return system, calm(bench.simulator.windows, bench.windows) if made else bench.windows.tolist()

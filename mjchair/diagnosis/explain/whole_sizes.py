@@ -169,5 +169,6 @@ def _at(base: Base, variant: Variant, windows: Sequence[int]) -> float:
 
 def _chi2(base: Base, variant: Variant, here: Track, windows: Sequence[int]) -> float:
     """Chi2 of windows with what is roughly known put where it fits best, priors included."""
-    system = base.bench.system(here, base.nuisances, len(base.nuisances), variant)
+    count = len(base.nuisances)
+    system = base.bench.system(here, base.nuisances, count, variant, only=windows)
     return bounded.reduce(system, windows).total

@@ -5,7 +5,7 @@ In: columns around a track. Out: the linear system of a variant of the chair.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -57,8 +57,12 @@ class Bench:
         nuisance: int,
         variant: Variant,
         free: int = 0,
+        only: Collection[int] | None = None,
     ) -> System:
-        """The linear system around a track of a variant; see `system.build`."""
+        """The linear system around a track of a variant; see `system.build`.
+
+        One of some windows `only` has no cells.
+        """
         system = build(
             self.simulator,
             track,
@@ -68,6 +72,8 @@ class Bench:
             offsets=variant.offsets,
             free=free,
             process=self.process,
+            only=only,
         )
-        system.set_cells(bounded.solve(system, self.windows, [])[0][:nuisance])
+        if only is None:
+            system.set_cells(bounded.solve(system, self.windows, [])[0][:nuisance])
         return system

@@ -261,12 +261,19 @@ def solve_nuisances(system: System, windows: Windows, which: Sequence[int]) -> t
     return out, float(system.c[w].sum() + priced @ priced - aim @ out[use])
 
 
-def information(system: System, windows: NDArray[np.int64]) -> Array:
-    """What data and priors say of all coefficients together: their precision (p, p)."""
-    n = system.nuisance
-    G = system.G[windows].sum(axis=0)
+def information(
+    system: System, windows: NDArray[np.int64], use: Sequence[int] | None = None
+) -> Array:
+    """What data and priors say of coefficients together: their precision (p, p).
+
+    Args:
+      use: places of the columns that are asked about; None: all.
+    """
+    at = np.arange(len(system.columns)) if use is None else np.array(use, np.int64)
+    G = system.G[np.ix_(windows, at, at)].sum(axis=0)
     size = np.maximum(np.diag(G), 1e-12)
-    return np.asarray(G + np.diag(np.r_[np.ones(n), 1e-8 * size[n:]]))
+    prior = np.where(at < system.nuisance, 1.0, 1e-8 * size)
+    return np.asarray(G + np.diag(prior))
 
 
 def covariance(system: System, windows: NDArray[np.int64]) -> Array:

@@ -24,6 +24,13 @@ class RoughlyKnown(ColumnId):
 
 
 @dataclass(frozen=True)
+class Otherwise(ColumnId):
+    """What the same chair shows otherwise that is computed in another way, by a number."""
+
+    member: int
+
+
+@dataclass(frozen=True)
 class ParameterId(ColumnId):
     """A parameter of an effect that is in the chair."""
 

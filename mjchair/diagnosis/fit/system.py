@@ -8,8 +8,8 @@ residual. Every later test, fit and score is made of sums of these (bounded.py).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -68,6 +68,26 @@ class System:
         """Places of columns."""
         return [self.places[c] for c in columns]
 
+    def of_data(self, k: int, first: int) -> System:
+        """The system of data that show what nuisance `k` changes; without the `first` columns.
+
+        The other nuisances stand in the centre of their priors. Cells are not set.
+        """
+        return replace(
+            self,
+            columns=self.columns[first:],
+            nuisance=self.nuisance - first,
+            G=self.G[:, first:, first:],
+            b=self.G[:, first:, k],
+            c=self.G[:, k, k],
+            back=np.zeros(self.nuisance - first),
+            slow=[
+                [np.column_stack([band[:, 1 + k], band[:, 1 + first :]]) for band in window]
+                for window in self.slow
+            ],
+            cells=[],
+        )
+
 
 def build(
     simulator: WindowSimulator,
@@ -79,6 +99,7 @@ def build(
     offsets: Mapping[str, float],
     free: int = 0,
     process: Process | None = None,
+    only: Collection[int] | None = None,
 ) -> System:
     """Eliminate every window's state and disturbances and form the products.
 
@@ -87,6 +108,7 @@ def build(
       nuisance: how many are. offsets: where nuisances already are, in standard deviations.
       free: how many of the nuisances, the last, are effects that are in.
       process: what shakes the chair; None: nothing.
+      only: windows that are asked about; the others tell nothing. None: all.
 
     Returns:
       The system without cells.
@@ -94,15 +116,17 @@ def build(
     ids = list(columns)
     p, count = len(ids), len(simulator.windows)
     G, b, c = np.zeros((count, p, p)), np.zeros((count, p)), np.zeros(count)
-    slow = []
+    slow: list[list[Array]] = [[] for _ in simulator.windows]
     raw = np.zeros(p)
     for i, w in enumerate(simulator.windows):
+        if only is not None and i not in only:
+            continue
         miss = residual(simulator.measured(w), track.predicted[i], simulator.channels)
         stacked = np.stack([columns[n][i] for n in ids], axis=2)
         window = eliminate_window(simulator, track, whitener, i, miss, stacked, process)
         G[i], b[i], c[i] = window.G, window.b, window.chi2
         raw += (window.J * window.J).sum(axis=0)
-        slow.append(slow_components(window, nuisance, whitener.slow(i, BAND)))
+        slow[i] = slow_components(window, nuisance, whitener.slow(i, BAND))
     hidden = taken_whole(G.sum(axis=0).diagonal(), raw)
     hidden[:nuisance] = False
     G[:, hidden, :], G[:, :, hidden], b[:, hidden] = 0.0, 0.0, 0.0

@@ -132,10 +132,11 @@ def track(
     white = np.array([noise[c].total for c in simulator.channels])
     errors = errors or SensorErrors(simulator.channels)
     count = len(simulator.windows)
+    # one after another along the runs where each begins in what the one before leaves
     by_index: dict[int, list[int]] = {}
     for i, w in enumerate(simulator.windows):
         if only is None or i in only:
-            by_index.setdefault(w.index, []).append(i)
+            by_index.setdefault(w.index if before is None else 0, []).append(i)
     states = _begun(simulator) if before is None else [s.copy() for s in before.states]
     predicted = [np.empty(0)] * count if before is None else list(before.predicted)
     kept = before is not None and not anew
