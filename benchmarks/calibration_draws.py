@@ -29,13 +29,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from calibration_studies import DRAWN, MADE, Kept
 from numpy.typing import NDArray
-from scipy import special
 from scipy.linalg import cho_factor, cho_solve
 
 from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import alternatives, forward_selection, hypotheses, selection
 from mjchair.diagnosis.explain import gap as gaps
-from mjchair.diagnosis.explain import hypotheses, search
 from mjchair.diagnosis.explain.candidates import Start
+from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.probability import (
     NONE,
@@ -46,6 +46,7 @@ from mjchair.diagnosis.explain.probability import (
     least_certain,
     weights,
 )
+from mjchair.diagnosis.explain.screening import silent
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.fit.column_ids import ParameterId
@@ -331,35 +332,18 @@ def _noise(bed: Bed, rng: np.random.Generator) -> list[Array]:
     return out
 
 
-class LinearSearch(search.Search):
-    """The diagnosis' search, whose fits are those of the linear system."""
+class LinearFits(Fits):
+    """The diagnosis' fits, made by the linear system."""
 
-    def _from(self, hypothesis: Hypothesis, share: float, best: Any) -> Any:
-        if share < 1.0:
-            return None
+    def _from_starts(self, hypothesis: Hypothesis, best: Any) -> Any:
+        """The linear fit: from any start it ends in the same place."""
         return _fit(self.base, hypothesis)
-
-    def _beside_part(self, hypothesis: Hypothesis, fitted: Any) -> Any:
-        """The fit itself: a linear one never goes astray."""
-        return fitted
 
     def near_to(self, tried: Any) -> Any:
         """Nothing else to weigh by: a linear system is the same around any chair."""
         return contextlib.nullcontext()
 
-    def beside(self, best: Any) -> Any:
-        """None: around the fit the algebra is what it is around the chair without effects."""
-        return None
-
-    def or_whole(self, here: Any) -> Any:
-        """What is here: a linear system neither slides nor shimmies."""
-        return here
-
-    def or_by_most_windows(self, here: Any) -> Any:
-        """What is here: a linear system goes another way nowhere."""
-        return here
-
-    def _begin_at(self, fewer: Hypothesis, more: Any) -> None:
+    def begin_at(self, fewer: Hypothesis, more: Any) -> None:
         """Nothing: a linear fit is the same from wherever it begins."""
 
     def anew(self, tried: Any) -> Any:
@@ -369,6 +353,26 @@ class LinearSearch(search.Search):
     def last_fit(self, tried: Any) -> Any:
         """The fit itself: a linear one ends in the same place from wherever it begins."""
         return tried.fitted
+
+    def gap_after(self, fitted: Any) -> Any:
+        """The gap test with the effects of a fit put in."""
+        system, bench = self.base.system, self.base.bench
+        put = system.index(fitted.columns)
+        rest = [i for i in range(system.nuisance, len(system.columns)) if i not in set(put)]
+        use = [*range(system.nuisance), *put, *rest]
+        count = system.nuisance + len(put)
+        inner = System(
+            columns=[system.columns[i] for i in use],
+            nuisance=count,
+            free=len(put),
+            G=system.G[:, use][:, :, use],
+            b=system.b[:, use],
+            c=system.c,
+            run=system.run,
+            back=np.r_[system.back, np.zeros(len(put))],
+        )
+        keys = [t.effect.key for t in fitted.variant.terms]
+        return gaps.test_gap(bench, inner, bench.windows, keys)
 
 
 def _fit(base: Any, hypothesis: Hypothesis) -> Any:
@@ -413,27 +417,6 @@ def _fit(base: Any, hypothesis: Hypothesis) -> Any:
         at_bound=tuple(stuck),
         columns=hypothesis.columns,
     )
-
-
-def _gap_after(base: Any, fitted: Any) -> Any:
-    """The gap test with the effects of a fit put in."""
-    system = base.system
-    put = system.index(fitted.columns)
-    rest = [i for i in range(system.nuisance, len(system.columns)) if i not in set(put)]
-    use = [*range(system.nuisance), *put, *rest]
-    count = system.nuisance + len(put)
-    inner = System(
-        columns=[system.columns[i] for i in use],
-        nuisance=count,
-        free=len(put),
-        G=system.G[:, use][:, :, use],
-        b=system.b[:, use],
-        c=system.c,
-        run=system.run,
-        back=np.r_[system.back, np.zeros(len(put))],
-    )
-    keys = [t.effect.key for t in fitted.variant.terms]
-    return gaps.test_gap(base.bench, inner, base.bench.windows, keys)
 
 
 def base_of(bed: Bed, y: Sequence[Array]) -> Any:
@@ -507,17 +490,15 @@ class Weighing:
 
 @contextlib.contextmanager
 def linear() -> Iterator[None]:
-    """The selection with linear algebra in place of simulations, and without slow detours."""
-    quick = SimpleNamespace(
-        chi2=SimpleNamespace(sf=lambda x, dof: special.chdtrc(dof, x)),
-        norm=SimpleNamespace(isf=lambda p: -special.ndtri(p)),
-    )
+    """The selection with linear algebra in place of simulations."""
     with (
-        mock.patch.object(search, "Search", LinearSearch),
-        mock.patch.object(search, "gap_after", _gap_after),
-        mock.patch.object(search, "confirmed", lambda _base, _fitted, gap: gap),
+        # around a fit the algebra is what it is around the chair without effects
+        mock.patch.object(forward_selection, "beside", lambda _fits, _best: None),
+        # a linear system neither slides nor shimmies, and goes another way nowhere
+        mock.patch.object(alternatives, "or_whole", lambda _fits, here: here),
+        mock.patch.object(alternatives, "or_by_most_windows", lambda _fits, here: here),
+        mock.patch.object(selection, "confirmed", lambda _base, _fitted, gap: gap),
         mock.patch.object(gaps, "DRAWS", DRAWS),
-        mock.patch.object(gaps, "stats", quick),
         mock.patch.object(gaps, "_cell_tests", lambda *_: []),
         mock.patch.object(hypotheses, "weigh", Weighing()),
     ):
@@ -528,7 +509,7 @@ def diagnosed(bed: Bed, y: Sequence[Array]) -> dict[str, Any]:
     """What the diagnosis' own selection and weights say of drawn data."""
     base = base_of(bed, y)
     gap = gaps.test_gap(base.bench, base.system, base.bench.windows)
-    choice = search.choose(base, gap, lambda _: None) if gap.exists else None
+    choice = selection.choose(LinearFits(base, silent)) if gap.exists else None
     found = weights(base, choice)
     first = sorted(found, key=lambda n: -(found[n].prior + found[n].evidence / 4.0))[:SHOWN]
     name = "+".join(choice.hypothesis.keys) if choice is not None else ""

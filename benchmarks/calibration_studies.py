@@ -36,9 +36,10 @@ from mjchair.diagnosis.diagnose import study_effects
 from mjchair.diagnosis.explain import missing_force
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import closure
+from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.probability import OUTSIDE, least_certain, weights
-from mjchair.diagnosis.explain.screening import Base, gap_after, prepare, screen_columns
-from mjchair.diagnosis.explain.search import choose
+from mjchair.diagnosis.explain.screening import Base, gap_after, prepare, screen_columns, silent
+from mjchair.diagnosis.explain.selection import choose
 from mjchair.diagnosis.fit.column_ids import ColumnId
 from mjchair.diagnosis.fit.elimination import eliminate_window
 from mjchair.diagnosis.replay.pulses import Force
@@ -345,7 +346,7 @@ def one(made: Made, out: Path, known: bool = False) -> dict:
             shutil.rmtree(folder)
             return {}
         gap = gap_after(base, base.plain)
-        choice = choose(base, gap, lambda _: None) if gap.exists else None
+        choice = choose(Fits(base, silent)) if gap.exists else None
         found = {name: [w.prior, w.evidence, w.fitted] for name, w in weights(base, choice).items()}
     shutil.rmtree(folder)
     line = {

@@ -122,12 +122,12 @@ def begun(monkeypatch, first):
     monkeypatch.setattr(further_effects, "refit", lambda *_: "the fit")
     monkeypatch.setattr(further_effects, "replace", lambda base, found: found)
     monkeypatch.setattr(further_effects, "with_noise", lambda base, bench: bench)
-    monkeypatch.setattr(further_effects, "Search", lambda found, _: found)
+    monkeypatch.setattr(further_effects, "Fits", lambda found, _: found)
     simulator = SimpleNamespace(windows=[])
     base = SimpleNamespace(bench=SimpleNamespace(power=1.0, simulator=simulator), nuisances={})
-    search = SimpleNamespace(base=base, say=lambda _: None)
-    found = further_effects.without_hidden(search)
-    return None if found is search else found
+    fits = SimpleNamespace(base=base, say=lambda _: None)
+    found = further_effects.without_hidden(fits)
+    return None if found is fits else found
 
 
 @pytest.mark.parametrize(
@@ -171,5 +171,5 @@ def test_one_effect_is_what_the_search_begins_with(monkeypatch, start, power, ad
 
 def test_a_chair_that_is_hardly_shaken_is_not_looked_at_again(monkeypatch):
     monkeypatch.setattr(further_effects.noise_shown, "loudness", lambda bench: bench)
-    search = SimpleNamespace(base=SimpleNamespace(bench=0.5 * LOUD))
-    assert further_effects.without_hidden(search) is search
+    fits = SimpleNamespace(base=SimpleNamespace(bench=0.5 * LOUD))
+    assert further_effects.without_hidden(fits) is fits

@@ -12,8 +12,25 @@ from unittest import mock
 import numpy as np
 import pytest
 
-from mjchair.diagnosis.explain import choice, search
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import (
+    alternatives,
+    backward_elimination,
+    choice,
+    forward_selection,
+    hypotheses,
+    multistart,
+    open_ended,
+    rivals,
+    selection,
+    shortlist,
+    whole_sizes,
+)
+from mjchair.diagnosis.explain import fits as fits_of_hypotheses
+from mjchair.diagnosis.explain.choice import Tried
+from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
+from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.effects import air_drag, wind
 from mjchair.errors import MjchairError
@@ -45,7 +62,7 @@ def fits(monkeypatch):
     """Fits as `refit` is asked for them; each answers (start, before, nuisances) with a fit."""
     asked, answers = [], {}
 
-    def refit(bench, start, before, nuisances=None, rounds=search.ROUNDS, most=np.inf):
+    def refit(bench, start, before, nuisances=None, rounds=multistart.ROUNDS, most=np.inf):
         keys = "+".join(sorted(t.effect.key for t in start.terms))
         asked.append((keys, before))
         answer = answers[keys, before]
@@ -56,12 +73,12 @@ def fits(monkeypatch):
     def terms(reduced, hypothesis, share=1.0):
         return tuple(Term(s.effect, {"size": 1.0}, ()) for s in hypothesis.starts)
 
-    monkeypatch.setattr(search.rules, "NOTHING", 0.0)  # no effect is so small that columns hold
-    monkeypatch.setattr(search.whole_sizes, "fits", lambda *_: ())
-    monkeypatch.setattr(search.whole_sizes, "compared", lambda _, fitted: fitted)
-    monkeypatch.setattr(search.open_ended, "with_least_sizes", lambda _, fitted: fitted)
-    monkeypatch.setattr(search, "refit", refit)
-    monkeypatch.setattr(search.hypotheses, "terms", terms)
+    monkeypatch.setattr(rules, "NOTHING", 0.0)  # no effect is so small that columns hold
+    monkeypatch.setattr(whole_sizes, "fits", lambda *_: ())
+    monkeypatch.setattr(whole_sizes, "compared", lambda _, fitted: fitted)
+    monkeypatch.setattr(open_ended, "with_least_sizes", lambda _, fitted: fitted)
+    monkeypatch.setattr(multistart, "refit", refit)
+    monkeypatch.setattr(hypotheses, "terms", terms)
     return SimpleNamespace(asked=asked, answers=answers)
 
 
@@ -69,6 +86,12 @@ def put(one, **changes):
     """Like `replace`, of stubs as well."""
     stub = isinstance(one, SimpleNamespace)
     return SimpleNamespace(**vars(one) | changes) if stub else replace(one, **changes)
+
+
+def believe(monkeypatch, believable):
+    """Take these fits for believable, wherever that is asked."""
+    for module in (fits_of_hypotheses, alternatives, rivals):
+        monkeypatch.setattr(module, "believable", believable)
 
 
 def searching():
@@ -81,7 +104,7 @@ def searching():
         found=None,
         best=None,
     )
-    return search.Search(base, lambda line: None)
+    return Fits(base, lambda line: None)
 
 
 def test_two_effects_that_fit_worse_than_one_start_again_from_it(fits):
@@ -112,12 +135,12 @@ def test_more_effects_are_to_fit_better_than_the_best_part_of_them(fits, monkeyp
 
     looking = searching()
     part = Hypothesis((ROLLING,), gain=500.0, score=490.0)
-    looking.tried = [choice.Rival(part, fit(1500.0, "rolling"))]
-    looking.again = [choice.Rival(part, fit(1450.0, "rolling"))]
+    looking.tried = [Tried(part, fit(1500.0, "rolling"))]
+    looking.again = [Tried(part, fit(1450.0, "rolling"))]
     looking.near = SimpleNamespace(refit=refit_near) if near else None
-    monkeypatch.setattr(search, "refit", refit)
-    looking._refit(BOTH, 1.0)
-    looking._refit(Hypothesis((MOTOR, WIND), gain=900.0, score=880.0), 1.0)
+    monkeypatch.setattr(multistart, "refit", refit)
+    looking.fit(BOTH)
+    looking.fit(Hypothesis((MOTOR, WIND), gain=900.0, score=880.0))
     assert asked == {"motor+rolling": 1450.0, "motor+wind": np.inf}
 
 
@@ -128,7 +151,7 @@ def test_what_fits_worse_than_nothing_is_begun_again_only_where_it_may_be_best(
     """Shares of an effect were tried although the best was 94 000 better than its promise."""
     fits.answers["wind", "as given"] = fit(2010.0, "wind", promised=2005.0)
     looking = searching()
-    best = search.Tried(ONE, fit(400.0, "rolling")) if known else None
+    best = Tried(ONE, fit(400.0, "rolling")) if known else None
     assert looking.fit(Hypothesis((WIND,), gain=900.0, score=880.0), best) is None
     assert fewest <= len(fits.asked) <= most
     assert looking.dropped == ["wind fits worse than nothing and is left out"]
@@ -137,7 +160,7 @@ def test_what_fits_worse_than_nothing_is_begun_again_only_where_it_may_be_best(
 def test_a_fit_that_went_astray_begins_once_more_near_no_effect():
     """The length of a trail that linear algebra promised turned casters over."""
     values = {"x": 4.0, "y": -2.0, "drag_area": 0.9}
-    here = search._smaller(Term(wind.EFFECT, values, ("x", "y", "drag_area")))
+    here = multistart._smaller(Term(wind.EFFECT, values, ("x", "y", "drag_area")))
     assert here.values == pytest.approx({"x": 0.4, "y": -0.2, "drag_area": 0.9})
 
 
@@ -162,15 +185,17 @@ def test_a_gap_is_laid_to_a_further_effect_only_once_the_first_is_fitted_anew(fi
     first, anew = fit(1500.0, "rolling"), fit(1110.0, "rolling")
     fits.answers[("rolling", "as given")] = first
     fits.answers[("rolling", "track of rolling")] = anew
-    monkeypatch.setattr(search.hypotheses, "singles", lambda *_: [ONE])
-    monkeypatch.setattr(search.hypotheses, "pairs", lambda *_: [BOTH])
-    monkeypatch.setattr(search, "gap_after", lambda _, f: SimpleNamespace(exists=f is first))
-    monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
-    monkeypatch.setattr(search, "believable", lambda _: True)
-    monkeypatch.setattr(search, "_replacements", lambda *_: [])
+    monkeypatch.setattr(hypotheses, "singles", lambda *_: [ONE])
+    monkeypatch.setattr(hypotheses, "pairs", lambda *_: [BOTH])
+    monkeypatch.setattr(
+        fits_of_hypotheses, "gap_after", lambda _, f: SimpleNamespace(exists=f is first)
+    )
+    monkeypatch.setattr(shortlist, "_commonest", lambda _, options: options[0])
+    believe(monkeypatch, lambda _: True)
+    monkeypatch.setattr(rivals, "with_one_more", lambda *_: [])
     base = searching().base
     base.starts = ()
-    chosen = search.choose(base, SimpleNamespace(exists=True), lambda line: None)
+    chosen = selection.choose(Fits(base, lambda line: None))
     assert chosen.hypothesis is ONE and chosen.fitted is anew
     assert "motor+rolling" not in {keys for keys, _ in fits.asked}
 
@@ -187,12 +212,12 @@ def test_a_gap_is_laid_to_a_further_effect_only_once_the_first_is_fitted_anew(fi
 def test_columns_are_made_anew_only_where_that_may_change_a_fit(
     fits, monkeypatch, total, promised, far, again
 ):
-    monkeypatch.setattr(search.rules, "NOTHING", 1.0)
+    monkeypatch.setattr(rules, "NOTHING", 1.0)
     first = fit(total, "rolling", promised=promised)
     first.variant = replace(first.variant, offsets={"mass": far})
     fits.answers["rolling", "track of rolling"] = anew = fit(total - 0.1, "rolling")
-    assert searching().anew(search.Tried(ONE, first)) is (anew if again else first)
-    assert searching().last_fit(search.Tried(ONE, first)) is anew
+    assert searching().anew(Tried(ONE, first)) is (anew if again else first)
+    assert searching().last_fit(Tried(ONE, first)) is anew
 
 
 def motor_brings_nothing(fits, monkeypatch, *, alone, anew, beside):
@@ -214,14 +239,14 @@ def motor_brings_nothing(fits, monkeypatch, *, alone, anew, beside):
         }
     )
     monkeypatch.setattr(
-        search.hypotheses, "weigh", lambda _, starts: Hypothesis(tuple(starts), 870.0, 850.0)
+        hypotheses, "weigh", lambda _, starts: Hypothesis(tuple(starts), 870.0, 850.0)
     )
 
 
 def test_an_effect_that_brings_nothing_once_all_is_made_anew_is_dropped(fits, monkeypatch):
     motor_brings_nothing(fits, monkeypatch, alone=1200.0, anew=1110.0, beside=1115.0)
     looking = searching()
-    chosen = looking.without_needless(looking.fit(BOTH))
+    chosen = backward_elimination.without_needless(looking, looking.fit(BOTH))
     assert chosen.hypothesis.keys == ("rolling",)
 
 
@@ -230,7 +255,7 @@ def test_an_effect_that_helped_a_stuck_fit_is_dropped(fits, monkeypatch):
     motor_brings_nothing(fits, monkeypatch, alone=1400.0, anew=1400.0, beside=1106.0)
     looking = searching()
     looking.fit(ONE)
-    chosen = looking.without_needless(looking.fit(BOTH))
+    chosen = backward_elimination.without_needless(looking, looking.fit(BOTH))
     assert chosen.hypothesis.keys == ("rolling",) and chosen.fitted.total == 1106.0
     assert looking.fit(ONE).fitted.total == 1106.0
 
@@ -241,12 +266,12 @@ def test_a_rival_takes_the_place_only_once_both_are_made_anew(rival, takes, fits
     motor = Hypothesis((MOTOR,), gain=500.0, score=490.0)
     fits.answers[("rolling", "track of rolling")] = fit(1108.4, "rolling")
     fits.answers[("motor", "track of motor")] = fit(rival, "motor")
-    monkeypatch.setattr(search, "believable", lambda _: True)
+    believe(monkeypatch, lambda _: True)
     looking = searching()
-    chosen = search.Tried(ONE, fit(1110.0, "rolling"))
-    others = {"rolling": [search.Tried(motor, fit(1112.0, "motor"))], "motor": [chosen]}
-    monkeypatch.setattr(looking, "rivals", lambda best: [others[best.hypothesis.keys[0]]])
-    best, _ = looking.against_rivals(chosen)
+    chosen = Tried(ONE, fit(1110.0, "rolling"))
+    others = {"rolling": [Tried(motor, fit(1112.0, "motor"))], "motor": [chosen]}
+    monkeypatch.setattr(rivals, "rivals_of", lambda _, best: [others[best.hypothesis.keys[0]]])
+    best, _ = rivals.against_rivals(looking, chosen)
     assert best.hypothesis is (motor if takes else ONE)
 
 
@@ -261,17 +286,19 @@ def test_a_second_effect_is_weighed_around_the_fit_of_the_first(fits, monkeypatc
     )
     both = fit(1110.0, "rolling", "motor")
     near = SimpleNamespace(refit=lambda starts, rounds, most: both, weigh=lambda starts: ONE)
-    monkeypatch.setattr(search, "near_fit", lambda base, found: near)
-    monkeypatch.setattr(search.hypotheses, "singles", lambda *_: [ONE])
-    monkeypatch.setattr(search.hypotheses, "pairs", lambda *_: [])
-    monkeypatch.setattr(search, "_with_one_more", lambda *_: [BOTH])
-    monkeypatch.setattr(search, "gap_after", lambda _, f: SimpleNamespace(exists=f is not both))
-    monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
-    monkeypatch.setattr(search, "believable", lambda _: True)
-    monkeypatch.setattr(search.Search, "is_worth", lambda *_: True)
+    monkeypatch.setattr(fits_of_hypotheses, "near_fit", lambda base, found: near)
+    monkeypatch.setattr(hypotheses, "singles", lambda *_: [ONE])
+    monkeypatch.setattr(hypotheses, "pairs", lambda *_: [])
+    monkeypatch.setattr(shortlist, "with_one_more", lambda *_: [BOTH])
+    monkeypatch.setattr(
+        fits_of_hypotheses, "gap_after", lambda _, f: SimpleNamespace(exists=f is not both)
+    )
+    monkeypatch.setattr(shortlist, "_commonest", lambda _, options: options[0])
+    believe(monkeypatch, lambda _: True)
+    monkeypatch.setattr(forward_selection, "is_worth", lambda *_: True)
     looking = searching()
     looking.base.starts = ()
-    best, left = search._grown(looking)
+    best, left = forward_selection.grown(looking)
     assert best.hypothesis is BOTH and best.fitted is both
     assert not left.exists and looking.near is None
 
@@ -288,18 +315,20 @@ def test_a_single_effect_may_be_what_the_search_for_noise_left_over(fits, monkey
         }
     )
     monkeypatch.setattr(
-        search.hypotheses, "weigh", lambda _, starts: Hypothesis(tuple(starts), 870.0, 850.0)
+        hypotheses, "weigh", lambda _, starts: Hypothesis(tuple(starts), 870.0, 850.0)
     )
-    monkeypatch.setattr(search.hypotheses, "singles", lambda *_: [ONE])
-    monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
-    monkeypatch.setattr(search, "believable", lambda _: True)
-    monkeypatch.setattr(search, "gap_after", lambda _, f: SimpleNamespace(exists=f is not motor))
+    monkeypatch.setattr(hypotheses, "singles", lambda *_: [ONE])
+    monkeypatch.setattr(shortlist, "_commonest", lambda _, options: options[0])
+    believe(monkeypatch, lambda _: True)
+    monkeypatch.setattr(
+        fits_of_hypotheses, "gap_after", lambda _, f: SimpleNamespace(exists=f is not motor)
+    )
     looking = searching()
     looking.base.starts = ()
     both = fit(1105.0, "rolling", "motor")
     both.sigmas = {"rolling": 0.5, "motor": 30.0}
     looking.base.best = SimpleNamespace(starts=(ROLLING, MOTOR), fitted=both)
-    best, left = search._grown(looking)
+    best, left = forward_selection.grown(looking)
     assert best.hypothesis.keys == ("motor",) and best.fitted is motor and not left.exists
 
 
@@ -319,15 +348,17 @@ def test_a_pair_that_was_fitted_while_the_noise_was_sought_may_be_the_better_one
             ("motor+wind", "track of motor+wind"): fit(1105.0, "motor", "wind"),
         }
     )
-    other = search.Tried(BOTH, fit(beside, "rolling", "motor"))
-    monkeypatch.setattr(search.hypotheses, "weigh", lambda _, starts: both)
-    monkeypatch.setattr(search.Search, "beside", lambda *_: (other, SimpleNamespace(exists=False)))
-    monkeypatch.setattr(search, "believable", lambda _: True)
-    monkeypatch.setattr(search, "gap_after", lambda *_: SimpleNamespace(exists=False))
+    other = Tried(BOTH, fit(beside, "rolling", "motor"))
+    monkeypatch.setattr(hypotheses, "weigh", lambda _, starts: both)
+    monkeypatch.setattr(
+        forward_selection, "beside", lambda *_: (other, SimpleNamespace(exists=False))
+    )
+    believe(monkeypatch, lambda _: True)
+    monkeypatch.setattr(fits_of_hypotheses, "gap_after", lambda *_: SimpleNamespace(exists=False))
     looking = searching()
     looking.base.best = SimpleNamespace(starts=both.starts, fitted=fit(1105.0, "motor", "wind"))
     first = looking.fit(ONE)
-    found, left = looking.further(first, 2)
+    found, left = forward_selection.further(looking, first, 2)
     assert (found.hypothesis is both) == pair
     assert found.fitted.total == min(beside, 1105.0) and not left.exists
 
@@ -350,18 +381,20 @@ def test_what_is_roughly_known_hides_no_effect(fits, monkeypatch, offset, narrow
     )
     other = Hypothesis((MOTOR,), gain=24_000.0, score=24_000.0)
 
-    monkeypatch.setattr(search, "replace", put)
-    monkeypatch.setattr(search.hypotheses, "singles", lambda *_: [other])
-    monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
-    monkeypatch.setattr(search, "believable", lambda _: True)
-    monkeypatch.setattr(search, "gap_after", lambda _, f: SimpleNamespace(exists=f.total > 1200.0))
+    monkeypatch.setattr(alternatives, "replace", put)
+    monkeypatch.setattr(hypotheses, "singles", lambda *_: [other])
+    monkeypatch.setattr(shortlist, "_commonest", lambda _, options: options[0])
+    believe(monkeypatch, lambda _: True)
+    monkeypatch.setattr(
+        fits_of_hypotheses, "gap_after", lambda _, f: SimpleNamespace(exists=f.total > 1200.0)
+    )
     looking = searching()
     looking.base.plain.variant = Variant((), offsets={"centre_x": offset})
     looking.base.starts = ()
     wide = looking.base.reduced
     wide.narrowed = lambda wall: SimpleNamespace(total=26_000.0)
     first = looking.fit(ONE)
-    found, _ = looking.or_as_given((first, SimpleNamespace(exists=True)))
+    found, _ = alternatives.or_as_given(looking, (first, SimpleNamespace(exists=True)))
     assert found.hypothesis.keys == (best,)
     assert (looking.base.reduced is wide) == (best == "rolling")
 
@@ -391,18 +424,21 @@ def test_windows_in_which_a_chair_goes_another_way_hide_no_effect(
         return SimpleNamespace(total=400.0)
 
     motor = Hypothesis((MOTOR,), gain=90.0, score=90.0)
-    monkeypatch.setattr(search, "replace", put)
-    monkeypatch.setattr(search.bounded, "reduce", reduce)
-    monkeypatch.setattr(search.hypotheses, "singles", lambda *_: [motor])
-    monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
-    monkeypatch.setattr(search, "believable", lambda _: True)
-    monkeypatch.setattr(search, "gap_after", lambda _, f: SimpleNamespace(exists=f.total > 1200.0))
+    monkeypatch.setattr(alternatives, "replace", put)
+    monkeypatch.setattr(bounded, "reduce", reduce)
+    monkeypatch.setattr(hypotheses, "singles", lambda *_: [motor])
+    monkeypatch.setattr(shortlist, "_commonest", lambda _, options: options[0])
+    believe(monkeypatch, lambda _: True)
+    monkeypatch.setattr(
+        fits_of_hypotheses, "gap_after", lambda _, f: SimpleNamespace(exists=f.total > 1200.0)
+    )
     looking = searching()
     looking.base.bench.windows = np.array([0, 1, 2, 5])
     looking.base.plain.chi2 = np.array([100.0, 110.0, far, 120.0])
     looking.base.starts, looking.base.system = (), None
     wide = looking.base.reduced
-    found, _ = looking.or_by_most_windows((looking.fit(ONE), SimpleNamespace(exists=True)))
+    here = (looking.fit(ONE), SimpleNamespace(exists=True))
+    found, _ = alternatives.or_by_most_windows(looking, here)
     assert found.hypothesis.keys == (best,)
     assert by == ([[0, 1, 5]] if far > 1000.0 else [])
     assert (looking.base.reduced is wide) == (best == "rolling")
@@ -419,17 +455,18 @@ def test_an_effect_of_a_whole_size_may_be_the_better_one(fits, monkeypatch, tota
         }
     )
     whole = fit(total, "motor")
-    monkeypatch.setattr(search.whole_sizes, "fits", lambda *_: [(MOTOR, whole)])
-    monkeypatch.setattr(search.hypotheses, "weigh", lambda *_: Hypothesis((MOTOR,), 9.0, 9.0))
-    monkeypatch.setattr(search, "believable", lambda _: True)
-    monkeypatch.setattr(search, "gap_after", lambda *_: SimpleNamespace(exists=False))
+    monkeypatch.setattr(whole_sizes, "fits", lambda *_: [(MOTOR, whole)])
+    monkeypatch.setattr(hypotheses, "weigh", lambda *_: Hypothesis((MOTOR,), 9.0, 9.0))
+    believe(monkeypatch, lambda _: True)
+    monkeypatch.setattr(fits_of_hypotheses, "gap_after", lambda *_: SimpleNamespace(exists=False))
     looking = searching()
     here = (looking.fit(ONE), SimpleNamespace(exists=True))
-    found, left = looking.or_whole(here)
+    found, left = alternatives.or_whole(looking, here)
     assert (found.fitted is whole and not left.exists) == (total < 1500.0)
-    monkeypatch.setattr(search.whole_sizes, "shimmies", lambda _: shimmies)
+    monkeypatch.setattr(whole_sizes, "shimmies", lambda _: shimmies)
     closed = (here[0], SimpleNamespace(exists=False))
-    stays = looking.or_whole(closed) is closed  # where nothing asks for one, none is looked for
+    # where nothing asks for one, none is looked for
+    stays = alternatives.or_whole(looking, closed) is closed
     assert stays == (not shimmies or total > 1500.0)
 
 
@@ -438,7 +475,7 @@ def test_a_fit_that_cannot_come_near_the_best_is_not_started_again(fits):
     fits.answers[("motor", "as given")] = fit(1500.0, "motor", promised=1450.0)
     fits.answers[("motor", "track of motor")] = fit(1440.0, "motor")
     rival = Hypothesis((MOTOR,), gain=560.0, score=550.0)
-    best = search.Tried(ONE, fit(1000.0, "rolling"))
+    best = Tried(ONE, fit(1000.0, "rolling"))
     assert searching().fit(rival, best).fitted.total == 1500.0
     assert searching().fit(rival).fitted.total == 1440.0
 
@@ -456,13 +493,13 @@ def test_one_window_neither_rules_a_rival_out_nor_keeps_it(worse, stays):
     scatter = np.resize([4.0, -4.0], len(worse))
     ours = np.full(len(worse), 100.0)
     total = ours.sum()
-    chosen = search.Tried(ONE, SimpleNamespace(total=total, chi2=ours, at_bound=()))
+    chosen = Tried(ONE, SimpleNamespace(total=total, chi2=ours, at_bound=()))
     theirs = ours + np.array(worse) + scatter
-    rival = search.Tried(
+    rival = Tried(
         Hypothesis((MOTOR,), 400.0, 390.0),
         SimpleNamespace(total=theirs.sum(), chi2=theirs, at_bound=()),
     )
-    assert search._not_ruled_out(rival, chosen, 12_000.0) == stays
+    assert rivals._not_ruled_out(rival, chosen, 12_000.0) == stays
 
 
 def test_where_no_second_effect_stands_no_third_is_tried(fits, monkeypatch):
@@ -471,20 +508,20 @@ def test_where_no_second_effect_stands_no_third_is_tried(fits, monkeypatch):
     fits.answers[("rolling", "as given")] = fit(1500.0, "rolling")
     fits.answers[("rolling", "track of rolling")] = fit(1490.0, "rolling")
     fits.answers[("motor+rolling", "as given")] = fit(1110.0, "rolling", "motor")
-    monkeypatch.setattr(search.hypotheses, "singles", lambda *_: [ONE])
-    monkeypatch.setattr(search.hypotheses, "pairs", lambda *_: [BOTH])
-    monkeypatch.setattr(search.hypotheses, "grown", lambda *_: [third])
-    monkeypatch.setattr(search, "gap_after", lambda *_: SimpleNamespace(exists=True))
-    monkeypatch.setattr(search, "confirmed", lambda _base, _fitted, gap: gap)
-    monkeypatch.setattr(search, "_commonest", lambda _, options: options[0])
-    monkeypatch.setattr(search, "believable", lambda f: len(f.variant.terms) == 1)
-    monkeypatch.setattr(search, "_replacements", lambda *_: [])
+    monkeypatch.setattr(hypotheses, "singles", lambda *_: [ONE])
+    monkeypatch.setattr(hypotheses, "pairs", lambda *_: [BOTH])
+    monkeypatch.setattr(hypotheses, "grown", lambda *_: [third])
+    monkeypatch.setattr(fits_of_hypotheses, "gap_after", lambda *_: SimpleNamespace(exists=True))
+    monkeypatch.setattr(selection, "confirmed", lambda _base, _fitted, gap: gap)
+    monkeypatch.setattr(shortlist, "_commonest", lambda _, options: options[0])
+    believe(monkeypatch, lambda f: len(f.variant.terms) == 1)
+    monkeypatch.setattr(rivals, "with_one_more", lambda *_: [])
     near = SimpleNamespace(weigh=lambda starts: ONE)
-    monkeypatch.setattr(search, "near_fit", lambda *_: near)
-    monkeypatch.setattr(search, "_with_one_more", lambda *_: [])
+    monkeypatch.setattr(fits_of_hypotheses, "near_fit", lambda *_: near)
+    monkeypatch.setattr(shortlist, "with_one_more", lambda *_: [])
     base = searching().base
     base.starts = ()
-    chosen = search.choose(base, SimpleNamespace(exists=True), lambda line: None)
+    chosen = selection.choose(Fits(base, lambda line: None))
     assert chosen.hypothesis is ONE
     assert "motor+rolling+scrub" not in {keys for keys, _ in fits.asked}
 
@@ -492,7 +529,7 @@ def test_where_no_second_effect_stands_no_third_is_tried(fits, monkeypatch):
 @pytest.mark.parametrize("total", [1005.0, 1490.0])
 def test_beyond_a_pair_that_ends_on_a_bound_one_more_is_tried(fits, monkeypatch, total):
     """A gain of the rims pushed the mass that moves to its bound; without a bound none is tried."""
-    third = search.Tried(
+    third = Tried(
         Hypothesis((ROLLING, MOTOR, WIND), gain=950.0, score=920.0),
         fit(total, "rolling", "motor", "wind"),
     )
@@ -500,15 +537,15 @@ def test_beyond_a_pair_that_ends_on_a_bound_one_more_is_tried(fits, monkeypatch,
     fits.answers[("rolling", "track of rolling")] = fit(1500.0, "rolling")
     fits.answers[("motor+rolling", "as given")] = fit(1110.0, "rolling", "motor")
     left = SimpleNamespace(exists=False)
-    monkeypatch.setattr(search.Search, "beside", lambda *_: (third, left))
-    monkeypatch.setattr(search.Search, "is_worth", lambda _, a, b: b.price < a.price)
+    monkeypatch.setattr(forward_selection, "beside", lambda *_: (third, left))
+    monkeypatch.setattr(forward_selection, "is_worth", lambda _, a, b: b.price < a.price)
     looking = searching()
     here = (looking.fit(ONE), SimpleNamespace(exists=True))
     pair = looking.fit(BOTH)
-    assert looking.beyond_bound(here, 2) is None
+    assert forward_selection.beyond_bound(looking, here, 2) is None
     pair.fitted.at_bound = ("mass",)
-    assert (looking.beyond_bound(here, 2) == (third, left)) == (total < 1400.0)
-    assert looking.beyond_bound(here, 3) is None
+    assert (forward_selection.beyond_bound(looking, here, 2) == (third, left)) == (total < 1400.0)
+    assert forward_selection.beyond_bound(looking, here, 3) is None
 
 
 @pytest.mark.parametrize(("worse", "stays"), [(60.0, True), (200.0, False)])
@@ -532,15 +569,16 @@ def test_a_rival_of_one_effect_is_weighed_against_what_that_effect_brings(
     theirs = SimpleNamespace(total=1_000.0 + worse, chi2=50.0 + worse / 20.0 + of_all, **bare)
     both = Hypothesis((ROLLING, MOTOR), gain=64_000.0, score=63_990.0)
 
-    def replacements(at, start, _):
-        near[start.effect.key] = at.near is not None
-        return [other] if start is MOTOR else []
+    def with_one_more(at, others, but):
+        (key,) = but
+        near[key] = at.near is not None
+        return [other] if key == "motor" else []
 
-    monkeypatch.setattr(search, "_replacements", replacements)
-    looking.fit = lambda hypothesis, best=None: search.Tried(hypothesis, theirs)
-    chosen = search.Tried(both, ours)
-    assert looking.own_gain(chosen, MOTOR) == 4_000.0
-    assert [len(group) for group in looking.rivals(chosen)] == [0, int(stays)]
+    monkeypatch.setattr(rivals, "with_one_more", with_one_more)
+    looking.fit = lambda hypothesis, best=None: Tried(hypothesis, theirs)
+    chosen = Tried(both, ours)
+    assert rivals.own_gains(looking, chosen)[1] == 4_000.0
+    assert [len(group) for group in rivals.rivals_of(looking, chosen)] == [0, int(stays)]
     assert near == {"rolling": False, "motor": True}  # around the fit: of the one that brings less
 
 

@@ -13,10 +13,11 @@ import mujoco
 from mjchair.diagnosis.data.study import Study
 from mjchair.diagnosis.data.study_file import read_study
 from mjchair.diagnosis.decide import conclude
+from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.further_effects import without_hidden
 from mjchair.diagnosis.explain.left_out import plain_gap
 from mjchair.diagnosis.explain.screening import Say, prepare, screen_columns, silent
-from mjchair.diagnosis.explain.search import Search, choose
+from mjchair.diagnosis.explain.selection import choose
 from mjchair.diagnosis.replay import strokes
 from mjchair.diagnosis.replay.cache import Store
 from mjchair.diagnosis.result import Diagnosis
@@ -66,12 +67,12 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"), without_engine_warnings():
         bench, first = prepare(known, say, store, threads)
         base = screen_columns(bench, first, study_effects(known, effects), say)
-        search = without_hidden(Search(base, say))
-        base = search.base
+        fits = without_hidden(Fits(base, say))
+        base = fits.base
         say("the gap")
         gap = plain_gap(base)
         say("effects, one and two at a time")
-        return conclude(base, gap, choose(base, gap, say, search) if gap.exists else None)
+        return conclude(base, gap, choose(fits) if gap.exists else None)
 
 
 def corrected(study: Study, diagnosis: Diagnosis) -> mujoco.MjSpec:

@@ -18,11 +18,17 @@ FURTHER = 3.5  # sigmas of a test whose statistic may count as left
 
 
 @dataclass(frozen=True)
-class Rival:
-    """A hypothesis that the data do not rule out, and its fit."""
+class Tried:
+    """A hypothesis and its fit."""
 
     hypothesis: Hypothesis
     fitted: Fitted
+
+    @property
+    def price(self) -> float:
+        """Chi2 with the penalty of the parameters, less for effects that are common."""
+        penalty = rules.PENALTY * self.hypothesis.free - self.hypothesis.prior
+        return self.fitted.total + penalty
 
 
 @dataclass(kw_only=True)
@@ -41,9 +47,9 @@ class Choice:
     hypothesis: Hypothesis
     fitted: Fitted
     after: Gap
-    rivals: list[list[Rival]]
+    rivals: list[list[Tried]]
     own_gains: list[float]
-    tried: list[Rival] = field(default_factory=list)
+    tried: list[Tried] = field(default_factory=list)
     dropped: list[str] = field(default_factory=list)
 
 

@@ -1,8 +1,8 @@
 """Whether what seems to shake the chair is noise, or further effects beside the best.
 
-In: a search around a screened base. Out: a search with the noise that an explanation by several
-effects leaves, and with this explanation, where it is the more probable one; else the search as it
-was.
+In: fits around a screened base. Out: fits around a base with the noise that an explanation by
+several effects leaves, and with this explanation, where it is the more probable one; else the fits
+as they were.
 
 The noise was taken around the best effects by linear algebra. Where several effects are there at
 once, those that are not among these pass for noise, which then hides them. So the best effect is
@@ -22,6 +22,7 @@ import numpy as np
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import hypotheses, noise_shown, whole_sizes
 from mjchair.diagnosis.explain.candidates import Start
+from mjchair.diagnosis.explain.fits import Fits, believable
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.screening import (
     LOUD,
@@ -32,7 +33,7 @@ from mjchair.diagnosis.explain.screening import (
     system_around,
     with_noise,
 )
-from mjchair.diagnosis.explain.search import Search, believable
+from mjchair.diagnosis.explain.shortlist import best_single
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.bounded import Reduced
@@ -61,17 +62,17 @@ class Explained:
     price: float
 
 
-def without_hidden(search: Search) -> Search:
-    """The search, or one with the noise that further effects leave, where these earn it.
+def without_hidden(fits: Fits) -> Fits:
+    """The fits, or new ones with the noise that further effects leave, where these earn it.
 
     Args:
-      search: that nothing was asked yet; the fits that are made here stay in it.
+      fits: of which none is made yet; those that are made here stay in them.
     """
-    base = search.base
+    base = fits.base
     if noise_shown.loudness(base.bench) <= LOUD:
-        return search
-    search.say("what passes for noise")
-    here = _first(search)
+        return fits
+    fits.say("what passes for noise")
+    here = _first(fits)
     # small changes do not lead to an effect of a whole size: the search would not find it again
     whole = any(p.whole for s in here.starts for p in s.effect.parameters)
     done = whole and whole_sizes.shimmies(base)  # what it leaves of a shimmy is no further effect
@@ -81,24 +82,24 @@ def without_hidden(search: Search) -> Search:
             break
         here = further
     if not here.starts or not (whole or _is_quieter(here.bench, base.bench)):
-        return search
+        return fits
     quieter = with_noise(base, here.bench)
     columns = nuisances_of(base, here.fitted)
     fitted = refit(here.bench, here.fitted.variant, here.fitted.track, columns)
-    return Search(replace(quieter, found=Found(here.starts, fitted)), search.say)
+    return Fits(replace(quieter, found=Found(here.starts, fitted)), fits.say)
 
 
-def _first(search: Search) -> Explained:
+def _first(fits: Fits) -> Explained:
     """The best effect with everything made anew around it, or none where it earns nothing."""
-    base = search.base
+    base = fits.base
     known = [_left(base, (), base.plain)]
-    best = search.best_single()
-    tried = search.fit(best) if best and best.gain > rules.needed(best.free) else None
-    fitted = search.anew(tried) if tried else None
+    best = best_single(fits)
+    tried = fits.fit(best) if best and best.gain > rules.needed(best.free) else None
+    fitted = fits.anew(tried) if tried else None
     if best and fitted:
         known.append(_left(base, best.starts, fitted))
     if whole_sizes.shimmies(base) or min(noise_shown.loudness(e.bench) for e in known) > SHAKEN:
-        search.say("effects of whole sizes")
+        fits.say("effects of whole sizes")
         known += [_left(base, (s,), f) for s, f in whole_sizes.fits(base, fitted)]
     first = min(known, key=attrgetter("price"))
     return _agreed(base, first) if first.starts else first

@@ -7,7 +7,7 @@ hypotheses with the chi2 that they gain, best first. Nothing is simulated here.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,10 +17,11 @@ from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.column_ids import EffectColumn
 from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.fit.variant import Term
-from mjchair.diagnosis.rules import PENALTY
+from mjchair.diagnosis.rules import MOST, PENALTY
 
 Array = NDArray[np.float64]
 SHORTLIST = 60
+GROWN = 3  # hypotheses of one size from which those of the next are grown
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,11 @@ class Hypothesis:
     def keys(self) -> tuple[str, ...]:
         """Keys of the effects, sorted."""
         return tuple(sorted(s.effect.key for s in self.starts))
+
+    @property
+    def label(self) -> str:
+        """Its effects, as a line for a reader names them."""
+        return " and ".join(self.keys)
 
     @property
     def columns(self) -> list[EffectColumn]:
@@ -91,6 +97,16 @@ def terms(reduced: Reduced, hypothesis: Hypothesis, share: float = 1.0) -> tuple
     """The effects with values from a share of the linear fit's coefficients."""
     coefficients = share * reduced.solve(reduced.index(hypothesis.columns))
     return tuple(start.term(mine) for start, mine in _split(hypothesis, coefficients))
+
+
+def by_size(reduced: Reduced, starts: Sequence[Start]) -> Iterator[list[Hypothesis]]:
+    """Hypotheses of one effect, of two, and of more that grow from these; each list best first."""
+    yield singles(reduced, starts)
+    here = pairs(reduced, starts)
+    yield here
+    for _ in range(2, MOST):
+        here = grown(reduced, starts, [h.starts for h in here[:GROWN]])
+        yield here
 
 
 def singles(reduced: Reduced, starts: Sequence[Start]) -> list[Hypothesis]:

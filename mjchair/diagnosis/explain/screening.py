@@ -204,10 +204,8 @@ def _reduced_anew(base: Base) -> Base:
 
 def _best(reduced: Reduced, starts: Sequence[Start]) -> Hypothesis | None:
     """The best hypothesis of any size, by linear algebra; None: none brings anything."""
-    singles = hypotheses.singles(reduced, starts)
-    pairs = hypotheses.pairs(reduced, starts)
-    more = hypotheses.grown(reduced, starts, [h.starts for h in pairs[:3]]) if pairs else []
-    known = [h for h in (*singles[:1], *pairs[:1], *more[:1]) if h.score > 0.0]
+    firsts = (h for options in hypotheses.by_size(reduced, starts) for h in options[:1])
+    known = [h for h in firsts if h.score > 0.0]
     return max(known, key=lambda h: h.score, default=None)
 
 

@@ -1,0 +1,117 @@
+"""Single effects that linear algebra around the chair without effects does not see, or sees small.
+
+In: fits, and the single effect that is best so far, with the gap that it leaves. Out: the same, or
+a better one: with what is only roughly known nearly as given, by most windows alone, of a whole
+size, or as it was left over while the noise was sought.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import hypotheses, whole_sizes
+from mjchair.diagnosis.explain.candidates import Start
+from mjchair.diagnosis.explain.choice import Tried
+from mjchair.diagnosis.explain.fits import Fits, believable, goes_far
+from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis.explain.shortlist import WithGap, best_of, better
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.bounded import Reduced
+
+APART = 10.0  # times the chi2 of most windows: there a chair went another way (assumption)
+NARROW = 1.0  # standard deviations: a wall for what may have taken an effect for itself
+
+
+def or_as_given(fits: Fits, here: WithGap | None) -> WithGap | None:
+    """The single effect, or a better one that leaves what is roughly known nearly as given.
+
+    What is roughly known may take an effect for itself, some numbers far from what they are
+    known to be. Then linear algebra that is wrong by little of a large effect does not see the
+    effect; with nearer walls it does. From there on it weighs with these.
+    """
+    wide = fits.base
+    if not goes_far(wide.plain):
+        return here
+    if here is not None and not here[1].exists and not goes_far(here[0].fitted):
+        return here
+    return _or_weighed_by(fits, wide.reduced.narrowed(NARROW), here)
+
+
+def or_by_most_windows(fits: Fits, here: WithGap | None) -> WithGap | None:
+    """The single effect, or a better one by the linear algebra of most windows alone.
+
+    Where a chair went another way, as where a caster swivels to the other side, no small change
+    explains what is seen, and the windows in which it did hide what the others say: the angle
+    sensor of the caster was taken for what a wheel did that is 2 mm larger.
+    """
+    wide = fits.base
+    most = _most_windows(wide)
+    if len(most) == len(wide.bench.windows) or (here is not None and not here[1].exists):
+        return here
+    return _or_weighed_by(fits, bounded.reduce(wide.system, most), here)
+
+
+def _or_weighed_by(fits: Fits, reduced: Reduced, here: WithGap | None) -> WithGap | None:
+    """The single effect, or a better one by other linear algebra, which then weighs on."""
+    before = fits.base
+    fits.base = replace(before, reduced=reduced)
+    other = best_of(fits, hypotheses.singles(reduced, before.starts), patient=False)
+    best = better(here, other)
+    if best is here:
+        fits.base = before
+    return best
+
+
+def or_left_over(fits: Fits, here: WithGap) -> WithGap:
+    """The single effect, or a better one that was left over while the noise was sought.
+
+    By linear algebra another may be the best alone.
+    """
+    known, left = fits.base.best, left_over(fits.base)
+    if not here[1].exists or known is None or len(known.starts) == 1 or len(left) != 1:
+        return here
+    alone = fits.weigh(left)
+    fits.begin_at(alone, known.fitted)
+    tried = fits.fit(alone)
+    if tried is None or tried.price >= here[0].price or not believable(tried.fitted):
+        return here
+    return tried, fits.gap_after(fits.anew(tried))
+
+
+def or_whole(fits: Fits, here: WithGap) -> WithGap:
+    """The single effect, or one of a whole size that is better.
+
+    These are tried where the first leaves a gap or a caster shimmies. Small changes do not lead
+    there, and what they lead to may stand in for it: a patch of the floor for wheels that
+    shimmy once.
+    """
+    if not here[1].exists and not whole_sizes.shimmies(fits.base):
+        return here
+    best = here[0]
+    for start, fitted in whole_sizes.fits(fits.base, fits.anew(best)):
+        tried = Tried(fits.weigh([start]), fitted)
+        fits.keep_better(tried)
+        if tried.price < best.price and believable(fitted):
+            best = tried
+    return here if best is here[0] else (best, fits.gap_after(best.fitted))
+
+
+def left_over(base: Base) -> list[Start]:
+    """The effects that are clear of what was best while the noise was sought.
+
+    There the best hypothesis of any size is fitted. In it, effects that only made up for a
+    large one being no linear one come to nothing.
+    """
+    known = base.best
+    if known is None:
+        return []
+    return [s for s in known.starts if known.fitted.sigmas[s.effect.key] > rules.SIGMAS]
+
+
+def _most_windows(base: Base) -> list[int]:
+    """The windows that are fitted to, but for those that disagree far more than most do."""
+    chi2 = base.plain.chi2
+    return [int(i) for i in base.bench.windows[chi2 <= APART * np.median(chi2)]]

@@ -1,0 +1,222 @@
+"""The fits of hypotheses: each is made once and kept, and those that cannot be are noted.
+
+In: the screened columns. Out: a fit for each hypothesis that is asked for, or None where this chair
+cannot have its effects; how much a hypothesis gains by the linear algebra that stands here: around
+the chair without effects, or around a fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from operator import attrgetter
+
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import hypotheses, open_ended, whole_sizes
+from mjchair.diagnosis.explain.candidates import Start
+from mjchair.diagnosis.explain.choice import Tried, is_there
+from mjchair.diagnosis.explain.gap import Gap
+from mjchair.diagnosis.explain.hypotheses import Hypothesis
+from mjchair.diagnosis.explain.multistart import MultiStart, made_anew
+from mjchair.diagnosis.explain.near_fit import NearFit, near_fit
+from mjchair.diagnosis.explain.screening import (
+    FAR,
+    Base,
+    Found,
+    Say,
+    gain,
+    gap_after,
+    nuisances_of,
+)
+from mjchair.diagnosis.fit.nonlinear import Fitted
+
+
+class Fits:
+    """Fits hypotheses, and notes those that cannot be.
+
+    Attributes:
+      base: around which. say: is called with the name of a fit as it begins.
+      tried: every fit that was made. impossible: starts of those that this chair cannot have.
+      again: of some of them, the fit with everything made anew around it.
+      dropped: a line for each hypothesis that this chair cannot have.
+      near: the linear algebra that weighs; None: that of the base. latest: the last around a fit.
+    """
+
+    def __init__(self, base: Base, say: Say) -> None:
+        """Nothing is tried yet."""
+        self.base, self.say = base, say
+        self.tried: list[Tried] = []
+        self.impossible: list[tuple[Start, ...]] = []
+        self.again: list[Tried] = []
+        self.dropped: list[str] = []
+        self.near = near_fit(base, base.found) if base.found else None
+        self.latest: NearFit | None = None
+
+    def weigh(self, starts: Sequence[Start]) -> Hypothesis:
+        """The hypothesis by linear algebra: around the effects that were found, if any."""
+        if self.near is not None:
+            return self.near.weigh(starts)
+        return hypotheses.weigh(self.base.reduced, starts)
+
+    def is_physical(self, hypothesis: Hypothesis) -> bool:
+        """Whether its linear coefficients are of such effects."""
+        if self.near is not None:
+            return self.near.physical(hypothesis.starts)
+        return hypotheses.physical(self.base.reduced, hypothesis)
+
+    @contextmanager
+    def near_to(self, tried: Tried) -> Iterator[None]:
+        """Weigh, and begin fits, by the linear algebra around a fit with everything made anew."""
+        before, self.near = self.near, self._around_fit(tried)
+        try:
+            yield
+        finally:
+            self.near = before
+
+    def _around_fit(self, tried: Tried) -> NearFit:
+        """The linear algebra around a fit; the last is kept, since it is asked for in a row."""
+        fitted = self.anew(tried)
+        if self.latest is None or self.latest.found.fitted is not fitted:
+            self.latest = near_fit(self.base, Found(tried.hypothesis.starts, fitted))
+        return self.latest
+
+    def fit(self, hypothesis: Hypothesis, best: Tried | None = None) -> Tried | None:
+        """The nonlinear fit; None where this chair cannot have these effects: that is noted.
+
+        Args:
+          best: so far; a fit that cannot come near it is not started again.
+        """
+        known = _of(hypothesis, self.tried)
+        if known is not None:
+            return Tried(hypothesis, known)
+        if hypothesis.starts in self.impossible:
+            return None
+        self.say(f"fit of {hypothesis.label}")
+        fitted = self._from_starts(hypothesis, best)
+        if fitted is not None and gain(self.base, fitted) < 0.0:
+            self._note(f"{hypothesis.label} fits worse than nothing and is left out")
+            fitted = None
+        if fitted is None:
+            self.impossible.append(hypothesis.starts)
+            return None
+        tried = Tried(hypothesis, fitted)
+        self.tried.append(tried)
+        return tried
+
+    def _from_starts(self, hypothesis: Hypothesis, best: Tried | None) -> Fitted | None:
+        """The best fit from several starts; None: this chair cannot have these effects."""
+        starts = MultiStart(
+            base=self.base,
+            hypothesis=hypothesis,
+            near=self.near,
+            part=self._part(hypothesis),
+            best=None if best is None else best.fitted,
+            note=self._note,
+        )
+        return starts.fit()
+
+    def _part(self, hypothesis: Hypothesis) -> Fitted | None:
+        """The best fit of some effects of a hypothesis; None: none was made."""
+        keys, every = set(hypothesis.keys), (*self.tried, *self.again)
+        parts = [t.fitted for t in every if set(t.hypothesis.keys) < keys]
+        return min(parts, key=attrgetter("total"), default=None)
+
+    def believed(self, hypothesis: Hypothesis, best: Tried | None = None) -> Tried | None:
+        """The fit, where every parameter is off its bounds and known better than beforehand."""
+        tried = self.fit(hypothesis, best)
+        if tried is None or believable(tried.fitted):
+            return tried
+        self._note(f"{hypothesis.label} is no answer: a number of it is not determined")
+        return None
+
+    def begin_at(self, fewer: Hypothesis, more: Fitted) -> None:
+        """Make the fit of fewer effects from where more of them ended, if that can be.
+
+        An effect that is hardly there may have helped the fit past the place where it was stuck.
+        """
+        keys = set(fewer.keys)
+        terms = tuple(t for t in more.variant.terms if t.effect.key in keys)
+        start, columns = replace(more.variant, terms=terms), nuisances_of(self.base, more)
+        fitted = made_anew(self.base.bench, start, more.track, columns)
+        if fitted is None:
+            return
+        exact = self._columns_hold(fitted)
+        if not exact:
+            again = made_anew(self.base.bench, fitted.variant, fitted.track) or fitted
+            fitted = min(fitted, again, key=attrgetter("total"))
+        self.keep_better(Tried(fewer, fitted), anew=not exact)
+
+    def keep_better(self, made: Tried, anew: bool = True) -> None:
+        """Keep a fit that was made elsewhere, unless a better one of its effects is known.
+
+        Args:
+          anew: whether all its columns were made around it.
+        """
+        known = _of(made.hypothesis, self.tried)
+        if known is None or made.fitted.total < known.total:
+            self.tried.insert(0, made)
+            if anew:
+                self.again.insert(0, made)
+
+    def anew(self, tried: Tried) -> Fitted:
+        """The fit with everything made anew around it, where that may change what it says."""
+        return tried.fitted if self._columns_hold(tried.fitted) else self._remade(tried)
+
+    def _columns_hold(self, fitted: Fitted) -> bool:
+        """Whether small effects stand where all columns are as good as they would be anew."""
+        missed = fitted.total - fitted.promised
+        small = rules.columns_hold(gain=gain(self.base, fitted), missed=missed)
+        return small and not goes_far(fitted)
+
+    def _remade(self, tried: Tried) -> Fitted:
+        """The fit with everything made anew around it; the fit itself where that cannot be."""
+        hypothesis, first = tried.hypothesis, tried.fitted
+        known = _of(hypothesis, self.again)
+        if known is None:
+
+            def note(why: str) -> None:
+                self._note(f"the fit of {hypothesis.label} was not made anew: {why}")
+
+            known = made_anew(self.base.bench, first.variant, first.track, note=note) or first
+            self.again.append(Tried(hypothesis, known))
+        return known
+
+    def last_fit(self, tried: Tried) -> Fitted:
+        """The fit with everything made anew, or a better one from beside its whole sizes.
+
+        Sizes that are open upwards have a least one.
+        """
+        fitted = whole_sizes.compared(self.base, self._remade(tried))
+        return open_ended.with_least_sizes(self.base, fitted)
+
+    def gap_after(self, fitted: Fitted) -> Gap:
+        """The gap that a fit leaves."""
+        return gap_after(self.base, fitted)
+
+    def _note(self, line: str) -> None:
+        if line not in self.dropped:
+            self.dropped.append(line)
+
+
+def _of(hypothesis: Hypothesis, fits: Sequence[Tried]) -> Fitted | None:
+    """The fit of a hypothesis among others; None: it is not there."""
+    return next((t.fitted for t in fits if t.hypothesis.starts == hypothesis.starts), None)
+
+
+def goes_far(fitted: Fitted) -> bool:
+    """Whether anything that is only roughly known is far from what it is known to be."""
+    return any(abs(by) >= FAR for by in fitted.variant.offsets.values())
+
+
+def believable(fitted: Fitted) -> bool:
+    """Whether every size is there, off its bounds, and known better than beforehand."""
+    sized = [(key, p) for term in fitted.variant.terms for key, p in term.parameters if p.sized]
+    return (
+        is_there(fitted)
+        and not fitted.at_bound
+        and all(
+            rules.believable(std=fitted.std[key], change=p.change, width=p.high - p.low)
+            for key, p in sized
+        )
+    )

@@ -1,0 +1,159 @@
+"""Forward selection: from one effect to as many as the data ask for.
+
+In: fits. Out: the best hypothesis that was grown effect by effect, and the gap that it leaves. It
+grows as long as it leaves a gap and a further effect is worth it.
+"""
+
+from __future__ import annotations
+
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import alternatives
+from mjchair.diagnosis.explain.choice import Tried
+from mjchair.diagnosis.explain.fits import Fits, goes_far
+from mjchair.diagnosis.explain.left_out import held_out, with_terms
+from mjchair.diagnosis.explain.screening import gain
+from mjchair.diagnosis.explain.shortlist import (
+    WithGap,
+    best_of,
+    best_single,
+    better,
+    of_size,
+    promising,
+)
+
+
+def grown(fits: Fits) -> WithGap | None:
+    """The best hypothesis, grown effect by effect, and the gap that it leaves; None: there is none.
+
+    It grows as long as it leaves a gap and a further effect is worth it.
+    """
+    if not _promises(fits):
+        return None
+    here = _found(fits)
+    size = len(here[0].hypothesis.starts) if here else 0
+    while size < rules.MOST and (here is None or here[1].exists):
+        size += 1
+        more = further(fits, here[0] if here else None, size)
+        if size == 1:
+            more = alternatives.or_as_given(fits, more)
+            more = alternatives.or_by_most_windows(fits, more)
+        if more is None and here is None:
+            continue
+        if more is None or (here is not None and not is_worth(fits, here[0], more[0])):
+            more = beyond_bound(fits, here, size) if here is not None else None
+            size += 1
+        if more is None:
+            break  # where no second effect stands beside the first, no third does
+        here = _settled(fits, more)
+        if size == 1:
+            here = alternatives.or_left_over(fits, here)
+            here = alternatives.or_whole(fits, here)
+    return here
+
+
+def _promises(fits: Fits) -> bool:
+    """Whether any effect may bring anything, alone or beside those that were found before."""
+    known = fits.base.found is not None or goes_far(fits.base.plain)
+    return known or best_single(fits) is not None
+
+
+def _found(fits: Fits) -> WithGap | None:
+    """The effects that were found before the search, and the gap that they leave."""
+    known = fits.base.found
+    if known is None:
+        return None
+    best = Tried(fits.weigh(known.starts), known.fitted)
+    fits.tried.append(best)
+    return best, fits.gap_after(best.fitted)
+
+
+def further(fits: Fits, best: Tried | None, size: int) -> WithGap | None:
+    """The best hypothesis of this many effects, and the gap that it leaves; None: none can be.
+
+    Args:
+      best: of one effect less; None: there is none.
+    """
+    if best is not None and fits.near is not None:
+        return best_of(fits, promising(fits, best), patient=False)
+    top = None if best is None else better(beside(fits, best), _fitted_before(fits, size))
+    if best is not None and _closes(top, best):
+        return top
+    # perhaps the first effect stands in for two others
+    return better(top, best_of(fits, of_size(fits, size), patient=best is None))
+
+
+def beside(fits: Fits, best: Tried) -> WithGap | None:
+    """The best hypothesis with one effect more, by the linear algebra around a fit.
+
+    Around a chair without effects, a large effect is wrong by more than a small one brings: a
+    payload of 40 kg hides that the centre of mass is 80 mm aside.
+
+    Args:
+      best: whose effects stay; everything is made anew around it.
+    """
+    with fits.near_to(best):
+        return best_of(fits, promising(fits, best), patient=False)
+
+
+def _fitted_before(fits: Fits, size: int) -> WithGap | None:
+    """What was best while the noise was sought, if of so many effects, and the gap it leaves.
+
+    The first effect may stand in for two others, whose fit is at hand.
+    """
+    known, left = fits.base.best, alternatives.left_over(fits.base)
+    if known is None or size not in (len(left), len(known.starts)):
+        return None
+    every = fits.weigh(left if len(left) == size else known.starts)
+    fits.begin_at(every, known.fitted)
+    tried = fits.believed(every)
+    return None if tried is None else (tried, fits.gap_after(tried.fitted))
+
+
+def _closes(more: WithGap | None, best: Tried) -> bool:
+    """Whether a larger hypothesis is better than the best and leaves no gap.
+
+    One that is worse may leave none as well, by what its own next step promises.
+    """
+    return more is not None and not more[1].exists and more[0].price < best.price
+
+
+def beyond_bound(fits: Fits, here: WithGap, size: int) -> WithGap | None:
+    """The best hypothesis of so many effects, with one more, where a size of it is on a bound.
+
+    Two rims of different gain pushed the mass that moves on a chair to its bound.
+
+    Args:
+      here: the best so far, of fewer effects, to which the larger one must be worth adding.
+    """
+    bound = [
+        t
+        for t in fits.tried
+        if len(t.hypothesis.starts) == size < rules.MOST
+        and t.fitted.total < here[0].fitted.total
+        and t.fitted.at_bound
+    ]
+    if not bound:
+        return None
+    more = beside(fits, min(bound, key=lambda t: t.fitted.total))
+    return more if more is not None and is_worth(fits, here[0], more[0]) else None
+
+
+def is_worth(fits: Fits, best: Tried, more: Tried) -> bool:
+    """Whether a larger hypothesis brings enough; both with everything made anew."""
+    base, one, other = fits.base, fits.anew(best), fits.anew(more)
+    held = held_out(base.bench, with_terms(base, one), with_terms(base, other))
+    return rules.worth_adding(
+        gained=one.total - other.total,
+        parameters=more.hypothesis.free - best.hypothesis.free,
+        held=held,
+        gain=gain(base, other),
+    )
+
+
+def _settled(fits: Fits, here: WithGap) -> WithGap:
+    """A fit with the gap that it leaves once everything is made anew around it.
+
+    A gap is not laid to a further effect before this one is fitted well.
+    """
+    best, left = here
+    return best, fits.gap_after(fits.anew(best)) if left.exists else left

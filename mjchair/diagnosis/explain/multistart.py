@@ -1,0 +1,208 @@
+"""The nonlinear fit of a hypothesis from several starts, of which the best counts.
+
+In: a hypothesis, the linear algebra that tells where to begin, and what was fitted before. Out: the
+best fit, or None where this chair cannot have these effects.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from operator import attrgetter
+
+import numpy as np
+
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import hypotheses
+from mjchair.diagnosis.explain.hypotheses import Hypothesis
+from mjchair.diagnosis.explain.near_fit import NearFit
+from mjchair.diagnosis.explain.screening import Base, Say, gain, silent
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.bench import Bench
+from mjchair.diagnosis.fit.column_ids import ColumnId
+from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
+from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.diagnosis.replay.derivatives import Column
+from mjchair.diagnosis.replay.window_states import Track
+from mjchair.errors import MjchairError
+
+SHARES = (0.875, 0.75, 0.625, 0.5, 0.375, 0.25, 0.125)  # of linear coefficients, for a new start
+SMALLER = 0.1  # of an effect, where a fit begins once more that went astray
+
+
+@dataclass(frozen=True, kw_only=True)
+class MultiStart:
+    """The fit of one hypothesis, from as many starts as it needs.
+
+    Attributes:
+      base: around which. hypothesis: what is fitted.
+      near: the linear algebra that tells where to begin; None: that of the base.
+      part: the best fit of some of the effects; None: none was made.
+      best: fit of another hypothesis; what cannot come near it is not started again. None: none.
+      note: is called with a line for each start or end that is left out.
+    """
+
+    base: Base
+    hypothesis: Hypothesis
+    near: NearFit | None
+    part: Fitted | None
+    best: Fitted | None
+    note: Say
+
+    def fit(self) -> Fitted | None:
+        """The best fit; from a second start where the first misses what was promised."""
+        return self._or_beside_part(self._best_start())
+
+    def _best_start(self) -> Fitted | None:
+        """The better of two starts; of one, where it gets to what was promised.
+
+        The second is the best place on the line from no effect to what linear algebra promises: a
+        tire with a quarter of its friction slides where one with a third of it does not.
+        """
+        first = self._from(1.0)
+        if self.near is not None:
+            return self._or_from_afar(first)
+        promised = self.base.reduced.total - self.hypothesis.gain
+        many = len(self.hypothesis.starts) > 1 and self.best is not None  # one start is enough
+        short = first is None or rules.fell_short(
+            total=first.total, promised=promised, gain=self.hypothesis.gain
+        )
+        if first is not None and (many or not short or self._is_behind(first)):
+            return first
+        share = self._best_share()
+        second = None if share is None else self._from(share)
+        fits = [f for f in (first, second) if f is not None]
+        if len(fits) > 1 and rules.starts_disagree(fits[0].total, fits[1].total):
+            ends = " and ".join(f"{f.total:.0f}" for f in fits)
+            names = self.hypothesis.label
+            self.note(f"fits of {names} from two starts end at chi2 of {ends}; the less is used")
+        return min(fits, key=attrgetter("total"), default=None)
+
+    def _or_from_afar(self, near: Fitted | None) -> Fitted | None:
+        """The fit that began near another, or one from afar where that one is stuck.
+
+        What the others had to be without this effect may be a valley of its own: with another
+        wheel a caster lifts off.
+        """
+        if (
+            near is not None
+            and gain(self.base, near) >= 0.0
+            and not rules.is_stuck(total=near.total, promised=near.promised)
+        ):
+            return near
+        afar = replace(self, near=None)._from(1.0)
+        fits = [f for f in (near, afar) if f is not None]
+        return min(fits, key=attrgetter("total"), default=None)
+
+    def _or_beside_part(self, fitted: Fitted | None) -> Fitted | None:
+        """The fit, or a better one that begins where a part of the hypothesis was fitted.
+
+        With one effect more nothing fits worse, so a fit that does has gone astray. It then begins
+        near no effect: the size that linear algebra promised led astray.
+        """
+        part = self.part
+        if part is None or (fitted is not None and fitted.total <= part.total):
+            return fitted
+        taken = {term.effect.key for term in part.variant.terms}
+        more = [_smaller(t) for t in self._terms() if t.effect.key not in taken]
+        start = replace(part.variant, terms=(*part.variant.terms, *more))
+        fits = [f for f in (fitted, made_anew(self.base.bench, start, part.track)) if f is not None]
+        return min(fits, key=attrgetter("total"), default=None)
+
+    def _best_share(self) -> float | None:
+        """The share of the linear coefficients that fits best as it stands; None: none can be."""
+        if len(self.hypothesis.starts) > 1:  # the simulations are worth it for a single effect only
+            return 0.5
+        totals = {}
+        for share in SHARES:
+            try:
+                totals[share] = self._refit(share, rounds=0).total
+            except (MjchairError, np.linalg.LinAlgError):
+                continue
+        return min(totals, key=totals.__getitem__, default=None)
+
+    def _from(self, share: float) -> Fitted | None:
+        """The fit that begins at a share of the linear fit's coefficients; None: none can be."""
+        try:
+            fitted = self._refit(share)
+        except (MjchairError, np.linalg.LinAlgError) as error:
+            self.note(f"{self.hypothesis.label} was not tried further: {error}")
+            return None
+        if self._is_behind(fitted):
+            pass  # what it would gain if all were made anew decides nothing
+        elif _walled(fitted):
+            fitted = self._around_terms(fitted)
+        elif rules.is_stuck(total=fitted.total, promised=fitted.promised):
+            fitted = made_anew(self.base.bench, fitted.variant, fitted.track) or fitted
+        return fitted
+
+    def _refit(self, share: float, rounds: int = ROUNDS) -> Fitted:
+        """The nonlinear fit that begins at a share of the linear fit's coefficients.
+
+        Raises:
+          MjchairError: there no chair can be.
+        """
+        base = self.base
+        most = np.inf if self.part is None else self.part.total
+        if self.near is not None:
+            return self.near.refit(self.hypothesis.starts, rounds, most)
+        terms = hypotheses.terms(base.reduced, self.hypothesis, share)
+        start = replace(base.around.variant, terms=terms)
+        return refit(base.bench, start, base.around.track, base.nuisances, rounds, most)
+
+    def _terms(self) -> tuple[Term, ...]:
+        """The effects with the values that linear algebra promises."""
+        if self.near is not None:
+            return self.near.terms(self.hypothesis.starts)
+        return hypotheses.terms(self.base.reduced, self.hypothesis)
+
+    def _is_behind(self, fitted: Fitted) -> bool:
+        """Whether a fit ends, by its own promise, too far behind the best to come near it."""
+        return self.best is not None and rules.out_of_reach(
+            promised=fitted.promised,
+            best=self.best.total,
+            gain=gain(self.base, self.best),
+        )
+
+    def _around_terms(self, fitted: Fitted) -> Fitted:
+        """The fit from the effects that were reached, what is roughly known as given; the better.
+
+        A large effect changes how a chair answers to its centre of mass or its inertia. Columns
+        that were made without it then push these numbers to the ends of what they may be.
+        """
+        again = made_anew(self.base.bench, replace(fitted.variant, offsets={}), fitted.track)
+        return fitted if again is None else min(fitted, again, key=attrgetter("total"))
+
+
+def made_anew(
+    bench: Bench,
+    start: Variant,
+    before: Track,
+    columns: dict[ColumnId, Column] | None = None,
+    note: Say = silent,
+) -> Fitted | None:
+    """The fit from a variant, all columns made there; None: no chair can be so.
+
+    Args:
+      columns: of what is roughly known, to be used instead; None: they are made there too.
+      note: is called with the reason where no chair can be so.
+    """
+    try:
+        return refit(bench, start, before, columns)
+    except (MjchairError, np.linalg.LinAlgError) as error:
+        note(str(error))
+        return None
+
+
+def _smaller(term: Term) -> Term:
+    """A tenth of an effect, in the place and at the time where it is."""
+    values = {
+        p.name: p.neutral + SMALLER * (term.values[p.name] - p.neutral)
+        for _, p in term.parameters
+        if p.sized
+    }
+    return replace(term, values={**term.values, **values})
+
+
+def _walled(fitted: Fitted) -> bool:
+    """Whether anything that is only roughly known stands on its wall."""
+    return any(abs(by) >= bounded.WALL for by in fitted.variant.offsets.values())

@@ -1,0 +1,166 @@
+"""Rivals: what could stand in the place of each effect that was chosen, and what fits better.
+
+In: fits, and the hypothesis that was chosen. Out: the best of it and its rivals, and the rivals of
+that one which the data do not rule out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from contextlib import nullcontext
+from dataclasses import replace
+
+import numpy as np
+
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain.backward_elimination import without_needless
+from mjchair.diagnosis.explain.candidates import Start
+from mjchair.diagnosis.explain.choice import Tried, is_there
+from mjchair.diagnosis.explain.fits import Fits, believable
+from mjchair.diagnosis.explain.hypotheses import Hypothesis
+from mjchair.diagnosis.explain.screening import gain
+from mjchair.diagnosis.explain.shortlist import with_one_more
+
+REFITTED = 5  # rivals of an effect that is alone
+BESIDE = 3  # rivals of each effect that has others beside it
+SWAPS = 2  # times that a rival takes the place of the chosen hypothesis
+
+
+def against_rivals(fits: Fits, chosen: Tried) -> tuple[Tried, list[list[Tried]]]:
+    """The best of the chosen hypothesis and what could stand in its places, with its rivals.
+
+    Linear algebra chose; a rival that fits better once both are made anew takes the place.
+    """
+    rivals = rivals_of(fits, chosen)
+    for _ in range(SWAPS):
+        better = _better_rival(fits, chosen, [r for group in rivals for r in group])
+        if better is None:
+            break
+        chosen = without_needless(fits, better)
+        rivals = rivals_of(fits, chosen)
+    return chosen, rivals
+
+
+def _better_rival(fits: Fits, chosen: Tried, rivals: Sequence[Tried]) -> Tried | None:
+    """The best of the rivals that are better than the choice; None: none is.
+
+    Columns that were made without the effects are wrong by some chi2, more for one hypothesis
+    than for another, so of those that are near everything is made anew.
+    """
+
+    def price_anew(tried: Tried) -> float:
+        return replace(tried, fitted=fits.anew(tried)).price
+
+    near = [r for r in rivals if believable(r.fitted) and r.price < chosen.price + rules.RIVAL_CHI2]
+    if not near:
+        return None
+    best = min(near, key=price_anew)
+    return best if price_anew(best) < price_anew(chosen) else None
+
+
+def rivals_of(fits: Fits, chosen: Tried) -> list[list[Tried]]:
+    """For every effect of the choice: what could stand in its place, best first.
+
+    In the place of all but the largest effect, it is weighed around the fit: around a chair
+    without effects, the largest is wrong by more than the others bring.
+    """
+    own = own_gains(fits, chosen)
+    out = []
+    for start, brought in zip(chosen.hypothesis.starts, own, strict=True):
+        with nullcontext() if brought == max(own) else fits.near_to(chosen):
+            out.append(_rivals(fits, chosen, start, brought))
+    return out
+
+
+def own_gains(fits: Fits, chosen: Tried) -> list[float]:
+    """Of every effect of the chosen hypothesis, the chi2 that it brings beside the others."""
+    return [_own_gain(fits, chosen, start) for start in chosen.hypothesis.starts]
+
+
+def _own_gain(fits: Fits, chosen: Tried, start: Start) -> float:
+    starts = chosen.hypothesis.starts
+    whole = gain(fits.base, chosen.fitted)
+    others = [s for s in starts if s is not start]
+    if not others:
+        return whole
+    with fits.near_to(chosen):
+        own = fits.weigh(starts).gain - fits.weigh(others).gain
+    return float(np.clip(own, 0.0, max(whole, 0.0)))
+
+
+def _rivals(fits: Fits, chosen: Tried, start: Start, own: float) -> list[Tried]:
+    """What could stand in the place of one effect, which brings `own` of chi2."""
+    starts = chosen.hypothesis.starts
+    others = tuple(s for s in starts if s is not start)
+    here = chosen.hypothesis if fits.near is None else fits.weigh(starts)
+    options = with_one_more(fits, others, {start.effect.key})
+    near = [h for h in options if _close(here, h, own)]
+    if others and not near:  # the first is always fitted: linear algebra tells little of it
+        near = [h for h in options[:1] if rules.may_be_alike(less=here.gain - h.gain, own=own)]
+    tried = [fits.fit(h, chosen) for h in near[: REFITTED if not others else BESIDE]]
+    tried += _in_place_of(fits.tried, chosen.hypothesis, start, [h.keys for h in near])
+    return [
+        t for t in tried if t is not None and is_there(t.fitted) and _not_ruled_out(t, chosen, own)
+    ]
+
+
+def _close(chosen: Hypothesis, other: Hypothesis, own: float) -> bool:
+    """Whether a rival is near enough, by linear algebra, to be fitted.
+
+    Args:
+      own: chi2 that the effect brings in whose place it would stand.
+    """
+    behind, less = chosen.score - other.score, chosen.gain - other.gain
+    return rules.worth_refitting(behind=behind, gain=own, rival_gain=own - less)
+
+
+def _in_place_of(
+    tried: Sequence[Tried], chosen: Hypothesis, start: Start, but: Collection[Sequence[str]]
+) -> list[Tried]:
+    """The best of what was fitted before of the chosen effects with another in place of one.
+
+    Linear algebra around a fit may not see how two large effects replace one another.
+
+    Args:
+      but: keys of hypotheses that are left out.
+    """
+    own, seen = start.effect.key, [set(keys) for keys in but]
+    stay = set(chosen.keys) - {own}
+    fits = [
+        t
+        for t in tried
+        if len(t.hypothesis.starts) == len(chosen.starts)
+        and stay < set(t.hypothesis.keys)
+        and own not in t.hypothesis.keys
+        and set(t.hypothesis.keys) not in seen
+    ]
+    best = {frozenset(t.hypothesis.keys): t for t in sorted(fits, key=lambda t: -t.price)}
+    return list(best.values())
+
+
+def _not_ruled_out(rival: Tried, chosen: Tried, brought: float) -> bool:
+    """Whether the data leave a rival standing.
+
+    Args:
+      brought: chi2, by the effect in whose place the rival would stand. It is the form of this
+        effect that may be wrong; what others bring beside it is no measure of that.
+
+    It is also out where all windows but the one that tells most against it rule it out: that one
+    makes the scatter over windows so large that it hides what the others say.
+    """
+    theirs, ours = rival.fitted.chi2, chosen.fitted.chi2
+    behind = rival.price - chosen.price
+    most = int(np.argmax(theirs - ours))
+    cases = (
+        (behind, theirs, ours),
+        (behind - (theirs - ours)[most], np.delete(theirs, most), np.delete(ours, most)),
+    )
+    return all(
+        rules.stays_a_rival(
+            behind=by,
+            gain=brought,
+            errors=rules.paired_errors(other, own),
+            beyond_bound=bool(rival.fitted.at_bound and not chosen.fitted.at_bound),
+        )
+        for by, other, own in cases
+    )

@@ -1,0 +1,37 @@
+"""The search for effects: from one to as many as the data need, compared with rivals.
+
+In: fits around the screened columns. Out: a `Choice`, or None where no effect brings anything. The
+rules that decide stand in rules.py; a hypothesis that this chair cannot have is dropped and noted.
+"""
+
+from __future__ import annotations
+
+from mjchair.diagnosis.explain.backward_elimination import without_needless
+from mjchair.diagnosis.explain.choice import Choice
+from mjchair.diagnosis.explain.fits import Fits
+from mjchair.diagnosis.explain.forward_selection import grown
+from mjchair.diagnosis.explain.null_ensemble import confirmed
+from mjchair.diagnosis.explain.rivals import against_rivals, own_gains
+
+
+def choose(fits: Fits) -> Choice | None:
+    """Grow from one effect to as many as the data ask for; None: no effect brings anything.
+
+    Args:
+      fits: around the base; those that were made already are used.
+    """
+    here = grown(fits)
+    if here is None:
+        return None
+    best, rivals = against_rivals(fits, without_needless(fits, here[0]))
+    fits.say("the last fit, with everything made anew around it")
+    fitted = fits.last_fit(best)
+    return Choice(
+        hypothesis=best.hypothesis,
+        fitted=fitted,
+        after=confirmed(fits.base, fitted, fits.gap_after(fitted)),
+        rivals=rivals,
+        own_gains=own_gains(fits, best),
+        tried=fits.tried,
+        dropped=fits.dropped,
+    )

@@ -1,0 +1,138 @@
+"""Which hypotheses are fitted, and in which order: those first that linear algebra likes best.
+
+In: fits, and the linear algebra that stands there. Out: hypotheses, best first, and of such a list
+the best that can be, with its fit and the gap that it leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from itertools import islice
+
+import numpy as np
+
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import hypotheses
+from mjchair.diagnosis.explain.candidates import Start
+from mjchair.diagnosis.explain.choice import Tried
+from mjchair.diagnosis.explain.fits import Fits
+from mjchair.diagnosis.explain.gap import Gap
+from mjchair.diagnosis.explain.hypotheses import Hypothesis
+
+TRIED = 3  # hypotheses of one size, where the first leaves a gap
+LISTED = 6  # hypotheses of one size, until one can be
+
+WithGap = tuple[Tried, Gap]  # a fit, and the gap that it leaves
+
+
+def of_size(fits: Fits, size: int) -> Sequence[Hypothesis]:
+    """Hypotheses of this many effects around the chair without any, best first."""
+    every = hypotheses.by_size(fits.base.reduced, fits.base.starts)
+    return next(islice(every, size - 1, None))
+
+
+def best_single(fits: Fits) -> Hypothesis | None:
+    """The effect with which the search begins; None: none brings anything."""
+    options = of_size(fits, 1)
+    return _commonest(fits, options) if options and options[0].score > 0.0 else None
+
+
+def with_one_more(
+    fits: Fits, others: tuple[Start, ...], but: Collection[str] = ()
+) -> list[Hypothesis]:
+    """The others with each further effect, but for the effects of these keys; best first."""
+    taken = {*but, *(s.effect.key for s in others)}
+    pool: dict[str, Hypothesis] = {}
+    for other in fits.base.starts:
+        key = other.effect.key
+        if key in taken:
+            continue
+        more = fits.weigh((*others, other))
+        if not np.isfinite(more.score) or not fits.is_physical(more):
+            continue
+        if key not in pool or more.score > pool[key].score:
+            pool[key] = more
+    return sorted(pool.values(), key=lambda h: -h.score)
+
+
+def promising(fits: Fits, best: Tried) -> list[Hypothesis]:
+    """Hypotheses of one effect more that may be worth it by the linear algebra around a fit."""
+    here = fits.weigh(best.hypothesis.starts)
+    return [
+        more
+        for more in with_one_more(fits, best.hypothesis.starts)
+        if rules.may_be_worth_adding(
+            promised=more.gain - here.gain,
+            parameters=more.free - here.free,
+            gain=more.gain,
+        )
+    ]
+
+
+def best_of(fits: Fits, options: Sequence[Hypothesis], patient: bool = True) -> WithGap | None:
+    """The best hypothesis with its fit, and the gap that it leaves; None: none can be.
+
+    Where the first leaves a gap, the linear order may be wrong, and the next are fitted too.
+
+    Args:
+      patient: whether, where none of these can be, the list is gone on along.
+    """
+    if not options or options[0].score <= 0.0:
+        return None
+    first = _commonest(fits, options)
+    top = fits.believed(first)
+    if top is not None:
+        left = fits.gap_after(top.fitted)
+        if not left.exists:
+            return top, left
+    near = [
+        h
+        for h in options
+        if h.keys != first.keys
+        and rules.worth_trying(score=h.score, best=first.score, gain=first.gain)
+    ]
+    tried = top
+    for other in near[: TRIED - 1]:
+        more = fits.believed(other, top)
+        if more is not None and (top is None or more.price < top.price):
+            top = more
+    if top is None and patient:  # favourites that cannot be say nothing of the others
+        believed = (fits.believed(other) for other in options[:LISTED])
+        top = next((fit for fit in believed if fit is not None), None)
+    if top is None:
+        return None
+    return top, left if top is tried else fits.gap_after(top.fitted)
+
+
+def better(one: WithGap | None, other: WithGap | None) -> WithGap | None:
+    """The one with the lower price; None: there is neither."""
+    return min((t for t in (one, other) if t is not None), key=lambda t: t[0].price, default=None)
+
+
+def _commonest(fits: Fits, options: Sequence[Hypothesis]) -> Hypothesis:
+    """Of the hypotheses that fit alike, the one whose effects stand first in the library."""
+    order = {s.effect.key: k for k, s in reversed(list(enumerate(fits.base.starts)))}
+    alike = [h for h in options if rules.alike(h.score, options[0].score)]
+    best = min(alike, key=lambda h: sorted(order[k] for k in h.keys))
+    for start in best.starts:
+        best = _freed(fits, best, start)
+    return best
+
+
+def _freed(fits: Fits, hypothesis: Hypothesis, start: Start) -> Hypothesis:
+    """The hypothesis with more of an effect's parameters free, where others of them fit alike.
+
+    A left drive 3 % weak and a right one 3 % strong differ by what the mass may be: then neither
+    number alone has the uncertainty that it shows.
+    """
+    others = tuple(s for s in hypothesis.starts if s is not start)
+    same = [s for s in fits.base.starts if s.group == start.group and s.effect.seeds is None]
+    weighed = {s.columns: fits.weigh((*others, s)) for s in same}
+    alike = {
+        column
+        for columns, h in weighed.items()
+        if len(columns) <= len(start.columns) and rules.alike(h.score, hypothesis.score)
+        for column in columns
+    }
+    richer = [c for c in weighed if alike <= set(c)]
+    return weighed[min(richer, key=len)] if len(alike) > len(start.columns) else hypothesis
