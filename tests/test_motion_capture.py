@@ -2,12 +2,12 @@
 
 from dataclasses import replace
 
-import ezc3d
 import imageio_ffmpeg
 import mujoco
 import numpy as np
 import pytest
 from conftest import has_graphics
+from lab_formats import write_c3d
 
 import mjchair
 from mjchair.cli import main
@@ -68,15 +68,7 @@ def c3d(path, names, positions, unit="m", factor=1.0):
     turned = np.stack([-positions[..., 1], positions[..., 2], -positions[..., 0]], axis=2)
     turned[..., 1] += 0.1
     turned[..., 2] -= (np.arange(len(positions)) / RATE * 1.4)[:, None]
-    file = ezc3d.c3d()
-    file["parameters"]["POINT"]["RATE"]["value"] = [RATE]
-    file["parameters"]["POINT"]["LABELS"]["value"] = list(names)
-    file["parameters"]["POINT"]["UNITS"]["value"] = [unit]
-    points = np.ones((4, len(names), len(positions)))
-    points[:3] = factor * turned.transpose(2, 1, 0)
-    file["data"]["points"] = points
-    file.write(str(path))
-    return path
+    return write_c3d(path, list(names), turned, RATE, unit=unit, factor=factor)
 
 
 @pytest.fixture(scope="module")
