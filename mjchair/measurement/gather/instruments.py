@@ -47,7 +47,8 @@ class Instrument:
       gyroscope, accelerometer: (n, 3) of a sensor on the frame, in its own axes; None.
       trigger: time at which its trigger rises, s; None. free: (n,), without a hand; None.
       radius: of the wheel, m, from the file; None. ground: (n,) m/s, of the chair over the floor,
-        by markers; None. notes: one line each.
+        by markers; None. doubted: whether its signs are those of a wheel of the other side.
+      notes: one line each.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Instrument:
     free: NDArray[np.bool_] | None = None
     radius: float | None = None
     ground: Array | None = None
+    doubted: bool = False
     notes: tuple[str, ...] = ()
 
 
@@ -130,7 +132,8 @@ def _wheels(sources: list[Source]) -> list[Instrument]:
         for i in mine:
             source, run = runs[i]
             rest = _rest(source, side, rests, single=len({s for s, _ in named}) == 1)
-            found.append(_wheel(source, run, (side, joint, named[i][1]), rest))
+            one = _wheel(source, run, (side, joint, named[i][1]), rest)
+            found.append(replace(one, doubted=signs[i].side == OTHER[side]))
     return found
 
 

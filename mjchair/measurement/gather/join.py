@@ -114,7 +114,12 @@ def _align(ours: Sequence[Instrument], other: Instrument) -> Alignment:
             f"turns; give the offset of {names[1]} with --offset FILE=SECONDS"
         )
     if other.speed is not None:
-        return clocks.align(*_of_wheels(ours, other), names)
+        one, two = _of_wheels(ours, other)
+        driven = any(w.torque for w in (*ours, other))
+        if driven or clocks.best_alignment(one, two).clear:
+            return clocks.align(one, two, names)
+        slowing = clocks.align_slowing(one, _in_unit_of(reference, other, two))
+        return slowing or clocks.align(one, two, names)
     if other.accelerometer is None:
         raise MjchairError(
             f"the clocks of {names[0]} and {names[1]} cannot be aligned: {names[1]} shows no "
@@ -136,6 +141,14 @@ def _of_wheels(ours: Sequence[Instrument], other: Instrument) -> tuple[Signal, S
         first, second = (next(iter(w.torque.values())) for w in (one, other))
         return Signal(one.time, first), Signal(other.time, second)
     return Signal(one.time, one.speed), Signal(other.time, other.speed)
+
+
+def _in_unit_of(reference: Instrument, other: Instrument, speed: Signal) -> Signal:
+    """The speed of another instrument; of markers, as that of the reference's wheel."""
+    if other.ground is None or reference.radius is None:
+        return speed
+    there = np.isfinite(other.ground)
+    return Signal(other.time[there], other.ground[there] / reference.radius)
 
 
 def _gained(ours: Sequence[Instrument]) -> Signal:
