@@ -144,8 +144,37 @@ def test_swapped_names_are_asked_about(rims):
         content = left.read_bytes(), right.read_bytes()
         left.write_bytes(content[1])
         right.write_bytes(content[0])
-    with pytest.warns(MjchairNote, match=r"push1_left\.csv, push1_right\.csv: .* swapped\?"):
+    with pytest.warns(MjchairNote, match=r"push1_left\.csv, push1_right\.csv: .* swapped, or"):
         gather(raw, Known(mass=90.0))
+
+
+def test_a_trial_whose_sides_are_swapped_does_not_turn_the_others(rims):
+    raw, (run, other) = rims(pushes=2, seconds=9.5)
+    assert other.way(9.5) > run.way(9.5)
+    left, right = raw / "push2_left.csv", raw / "push2_right.csv"  # the run that goes farther
+    content = left.read_bytes(), right.read_bytes()
+    left.write_bytes(content[1])
+    right.write_bytes(content[0])
+    with pytest.warns(MjchairNote, match=r"^push2_left\.csv, push2_right\.csv: .* swapped, or"):
+        one, _ = gather(raw, Known(mass=90.0)).trials
+    there = np.isfinite(one.columns["left_wheel"])
+    off = one.columns["left_wheel"] - run.hand(one.time + LATE["right"])
+    assert np.std(off[there]) < 0.15
+
+
+def test_a_chair_that_is_not_seen_for_a_while_still_tells_its_clock(rims):
+    raw, (run,) = rims(seconds=10.0)
+    time = np.arange(0.0, 10.0 - LATE["markers"], 0.01)
+    truly = time + LATE["markers"]
+    speed = np.interp(truly, run.rolled.time, run.rolled.speed)
+    speed[(truly > 2.0) & (truly < 4.5)] = np.nan
+    rows = np.column_stack([time, np.sin(time), speed])
+    lines = [",".join("" if x != x else f"{x:.6g}" for x in row) for row in rows]
+    text = "\n".join(["time,rider_motion,chair_speed", *lines])
+    (raw / "push1_rider.csv").write_text(text)
+    (trial,) = gather(raw, Known(mass=90.0)).trials
+    found = trial.alignments["push1_rider.csv"]
+    assert found.offset == pytest.approx(LATE["markers"], abs=0.005)
 
 
 def test_runs_of_two_persons_are_not_put_into_one_study(tmp_path):

@@ -107,7 +107,8 @@ def _ask_sides(trials: Sequence[GatheredTrial]) -> None:
     if names:
         note(
             f"{', '.join(names)}: by name of one side and by signs of the other; are left and "
-            "right swapped? The names are believed: rename the files, or say it in gather.toml"
+            "right swapped, or did it roll backwards? The names are believed: rename the files, "
+            "or say it in gather.toml"
         )
 
 
