@@ -3,9 +3,10 @@
 The motion is that of a rigid chair by plain equations; nothing of the package is used.
 """
 
+import lab_formats
 import numpy as np
 
-RADIUS, TRACK, RATE = 0.3, 0.56, 240.0
+RADIUS, TRACK, RATE = 0.3, 0.56, lab_formats.RATE
 GRAVITY = 9.80665
 
 
@@ -43,27 +44,12 @@ def smartwheel(path, run, side, *, start=0.0, wrap=True, seed=0, semicolon=False
     at = np.arange(start, time[-1], 1.0 / rate)
     column = 0 if side == "left" else 1
     angle = np.r_[0.0, np.cumsum(wheels[:-1, column] * 1e-3)]
-    turned = 1.234 + np.interp(at, time, angle)
-    counted = -turned if side == "left" else turned
-    ticks = np.floor(counted / (2 * np.pi) * 4096)
     moment = np.interp(at, time, torque[:, column])
-    force = 3.0 * moment
-    table = np.zeros((at.size, 24))
-    table[:, 0] = table[:, 1] = np.arange(at.size) + 1
-    table[:, 2] = ticks % 4096 if wrap else ticks
-    table[:, 3] = np.round((ticks % 4096) / 4096 * 360, 2)
-    table[:, 4] = np.abs(np.interp(at, time, wheels[:, column])) * RADIUS
-    noise = rng.normal(size=(at.size, 6)) * [0.7, 0.7, 0.7, 0.1, 0.1, 0.12]
-    table[:, 18:] = noise + np.array([1.0, -2.0, 0.5, 0.2, 0.1, 0.25])
-    weight = np.round(counted / (2 * np.pi) * 4096) / 4096 * 2 * np.pi
-    table[:, 18] += force * 0.8 + 6.0 * np.cos(weight)
-    table[:, 19] += -force * 0.6 + 6.0 * np.sin(weight)
-    table[:, 23] += moment if side == "left" else -moment
-    if semicolon:
-        lines = [";".join(f"{x:g}".replace(".", ",") for x in row) for row in table]
-    else:
-        lines = [",".join(f"{x:g}" for x in row) + "," for row in table]
-    path.write_text("\n".join(lines) + "\n")
+    hand = moment[:, None] * [2.4, -1.8, 0.0, 0.0, 0.0, 1.0]
+    lab_formats.write_smartwheel(
+        path, side, 1.234 + np.interp(at, time, angle), np.interp(at, time, wheels[:, column]),
+        hand, rng, radius=RADIUS, style=lab_formats.Style(wrap=wrap, semicolon=semicolon),
+    )  # fmt: skip
 
 
 def signals(run, rate, offset, drift=0.0, seed=1, seconds=None):

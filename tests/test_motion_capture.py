@@ -2,12 +2,12 @@
 
 from dataclasses import replace
 
-import ezc3d
 import imageio_ffmpeg
 import mujoco
 import numpy as np
 import pytest
 from conftest import has_graphics
+from lab_formats import write_c3d
 
 import mjchair
 from mjchair.cli import main
@@ -68,15 +68,7 @@ def c3d(path, names, positions, unit="m", factor=1.0):
     turned = np.stack([-positions[..., 1], positions[..., 2], -positions[..., 0]], axis=2)
     turned[..., 1] += 0.1
     turned[..., 2] -= (np.arange(len(positions)) / RATE * 1.4)[:, None]
-    file = ezc3d.c3d()
-    file["parameters"]["POINT"]["RATE"]["value"] = [RATE]
-    file["parameters"]["POINT"]["LABELS"]["value"] = list(names)
-    file["parameters"]["POINT"]["UNITS"]["value"] = [unit]
-    points = np.ones((4, len(names), len(positions)))
-    points[:3] = factor * turned.transpose(2, 1, 0)
-    file["data"]["points"] = points
-    file.write(str(path))
-    return path
+    return write_c3d(path, list(names), turned, RATE, unit=unit, factor=factor)
 
 
 @pytest.fixture(scope="module")
@@ -216,6 +208,8 @@ def bad(case, names, positions):
     ]
     gone = positions.copy()
     gone[:, : len(names) - 4] = np.nan
+    unseen = positions.copy()
+    unseen[:, -4:] = np.nan
     long = positions.copy()
     arm = names.index("LELB")
     long[:, arm] += 3.0 * (positions[:, arm] - positions[:, names.index("LSHO")])
@@ -224,6 +218,7 @@ def bad(case, names, positions):
         "mm called m": (names, positions, "m", 1000.0),
         "gap throughout": (names, gone, "m", 1.0),
         "no chair": (names[:-4], positions[:, :-4], "m", 1.0),
+        "chair unseen": (names, unseen, "m", 1.0),
         "too long": (names, long, "m", 1.0),
         "unknown unit": (names, positions, "furlong", 1.0),
     }[case]
@@ -236,6 +231,7 @@ def bad(case, names, positions):
         ("mm called m", "are they in mm called m?"),
         ("gap throughout", "cannot be told|0 markers of the person were ever seen"),
         ("no chair", "no marker on the chair or the pelvis"),
+        ("chair unseen", "no marker on the chair or the pelvis was ever seen"),
         ("too long", "times what is usual"),
         ("unknown unit", "unit 'furlong' of its points"),
     ],
@@ -271,5 +267,7 @@ def test_two_people_are_told_apart(truth, tmp_path):
         elbow = names.index(f"{side}ELB")
         tall[:, hand] += 0.25 * (tall[:, hand] - tall[:, [elbow]])
     static = c3d(tmp_path / "static.c3d", names, tall)
-    with pytest.raises(MjchairError, match=r"of another person: its (left|right)_forearm is 1\.2"):
+    with pytest.raises(
+        MjchairError, match=r"static\.c3d: .* of another person: its (left|right)_forearm is 1\.2"
+    ):
         captured(run, static=static)

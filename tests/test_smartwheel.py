@@ -190,6 +190,7 @@ def test_jumps_once_a_turn_are_masked(tmp_path, stay):
     np.testing.assert_allclose(read.angle, angle, atol=0.012)
     assert np.abs(read.speed - np.gradient(angle) * 240).max() < 0.35  # a jump alone gives 1.8
     assert "of every turn" in read.notes[0]
+    assert "jumps by 5.2" in read.notes[0]  # deg: 60 of 4096 ticks
     passed = np.flatnonzero(np.diff(turns))
     assert not read.there[passed + 1].any()
     assert (~read.there).sum() < 4 * passed.size + 4

@@ -10,6 +10,7 @@ import argparse
 import shutil
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -83,14 +84,28 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _of_markers(known: Known) -> ReadsMarkers:
-    """What makes the motion of a rider of markers, as `mjchair rider` does."""
+    """What makes the motion of a rider of markers, as `mjchair rider` does.
+
+    All files must be of one person, whose mass is that of the study.
+    """
+    first: list[tuple[Path, Mapping[str, float]]] = []
 
     def read(path: Path, still: Path | None) -> tuple[Table, list[str]]:
-        from mjchair.motion.capture import captured, table_columns
+        from mjchair.motion.capture import captured, table_columns, unlike
         from mjchair.motion.inverse_kinematics import Build
         from mjchair.simulation.table import Table
 
         motion = captured(path, None, still, Build("manual", None, known.rider_mass))
+        lengths = motion.rider.lengths
+        first.append((path, lengths))
+        before, theirs = first[0]
+        segment = unlike(theirs, lengths)
+        if segment:
+            raise MjchairError(
+                f"{path.name} is of another person than {before.name}: its {segment} is "
+                f"{lengths[segment] / theirs[segment]:.2f} times as long; gather one person at a "
+                "time"
+            )
         off = {name: f"{1e3 * value:.0f}" for name, value in motion.residuals.items()}
         worst = max(motion.residuals, key=lambda name: motion.residuals[name])
         notes = [

@@ -10,6 +10,9 @@ rings at the ends of a recording of 10 s, at another place in each of the two. T
 deviation is the Cramer-Rao bound of a delay in coloured noise. Strokes that come evenly make other
 lags nearly as good, a stroke aside: an alignment is clear only if chance would not put another lag
 that near. Drift is the slope of offsets of parts of the recording.
+
+A coast that never stops is a straight line and has no such lag. Two instruments that read one speed
+are put where they read the same (`align_slowing`); that is as sure as their speeds are equal.
 """
 
 from __future__ import annotations
@@ -39,6 +42,10 @@ NEAR = 0.25  # s, within which a part's offset is looked for
 AGREES = 0.1  # s, within which the offsets of parts agree
 FIVE = 5  # parts, fewer of which do not tell a drift
 MOST = 0.5  # share of the parts that must agree
+SLOWS = -0.95  # correlation of speed and time, above which a run does not only slow
+UNLIKE = 0.01  # of the speed, by which two wheels of a chair that rolls straight differ; assumption
+COURSE = 0.02  # of the mean speed, rms, beyond which two speeds are not of one motion
+UNSURE = 0.2  # s, standard deviation beyond which equal speed does not tell a lag
 
 
 class Signal(NamedTuple):
@@ -97,7 +104,7 @@ def align(reference: Signal, other: Signal, names: tuple[str, str] = ("one", "tw
             why += f", {found.rival_correlation:.2f} at {found.rival:+.2f} s"
         raise MjchairError(
             f"the clocks of {names[0]} and {names[1]} cannot be aligned: {why}; give the offset "
-            f"of {names[1]} with --offset FILE={found.offset:.3f}, or leave the file out"
+            f"of {names[1]} with --offset FILE=SECONDS, or leave the file out"
         )
     return found
 
@@ -136,15 +143,61 @@ def best_alignment(reference: Signal, other: Signal) -> Alignment:
     )
 
 
+def align_slowing(reference: Signal, other: Signal) -> Alignment | None:
+    """The alignment at which two instruments read one speed, in a run that only slows.
+
+    Args:
+      reference, other: (n,), in one unit.
+
+    Returns:
+      None for a run that does more than slow, two speeds that are not alike at any lag, or one
+      that changes too little to tell a lag within 0.2 s.
+    """
+    one, two = _smooth(reference), _smooth(other)
+    first, second = one.values[:, 0], two.values[:, 0]
+    if min(len(first), len(second)) < OVERLAP * GRID:
+        return None
+    if any(np.corrcoef(v, np.arange(len(v)))[0, 1] > SLOWS for v in (first, second)):
+        return None
+    lags = np.arange(len(first) + len(second) - 1) - (len(second) - 1)
+    least = max(OVERLAP * GRID, 0.5 * min(len(first), len(second)))
+    lags = lags[_together(len(first), len(second), lags) >= least]
+    off = np.array([np.sqrt(np.mean(np.square(_apart(first, second, int(k))))) for k in lags])
+    best = int(np.argmin(off))
+    if best in (0, lags.size - 1):
+        return None
+    left = _apart(first, second, int(lags[best]))
+    slope = float(first[-1] - first[0]) * GRID / (len(first) - 1)
+    speed = float(np.mean(first))
+    spread = UNLIKE * speed / abs(slope)
+    if off[best] > COURSE * speed or spread > UNSURE:
+        return None
+    lag = float(lags[best]) / GRID - float(np.mean(left)) / slope
+    start = float(one.time[0] - two.time[0])
+    return Alignment(start + lag, spread, how="equal speed as it slows")
+
+
+def _apart(first: Array, second: Array, lag: int) -> Array:
+    """What lies together of two recordings at a lag, one less the other."""
+    begin, end = max(0, lag), min(len(first), lag + len(second))
+    return np.asarray(first[begin:end] - second[begin - lag : end - lag])
+
+
 def _even(signal: Signal) -> Signal:
     """The signal on the common grid, smoothed, without its mean, (m, k)."""
+    smooth = _smooth(signal)
+    return Signal(smooth.time, smooth.values - smooth.values.mean(axis=0))
+
+
+def _smooth(signal: Signal) -> Signal:
+    """The signal on the common grid, smoothed, (m, k)."""
     time = np.arange(signal.time[0], signal.time[-1], 1.0 / GRID)
     values = np.atleast_2d(signal.values.T).T
     even = np.column_stack([np.interp(time, *_there(signal.time, v)) for v in values.T])
     if len(even) > 4 * GRID / 10:
         sos = butter(2, FASTEST, "lowpass", fs=GRID, output="sos")
         even = sosfiltfilt(sos, even, axis=0)
-    return Signal(time, even - even.mean(axis=0))
+    return Signal(time, even)
 
 
 def _there(time: Array, values: Array) -> tuple[Array, Array]:

@@ -70,10 +70,13 @@ def find_jumps(angle: Array) -> Jumps:
         return NONE
     first = wild[np.r_[True, np.diff(wild) > NEIGHBOURS]]
     last = np.r_[wild[np.flatnonzero(np.diff(wild) > NEIGHBOURS)], wild[-1]]
-    sizes = np.array([beside[a : b + 1].sum() for a, b in zip(first, last, strict=True)])
-    size = float(np.median(sizes))
+    courses = [np.cumsum(beside[a : b + 1]) for a, b in zip(first, last, strict=True)]
+    size = float(np.median([course[-1] for course in courses]))
     place, stay = _once_a_turn(angle, first, size)
-    return Jumps(wild + 1, size, place, stay if np.isfinite(place) else abs(size) > limit)
+    stay = abs(size) > limit and (stay or not np.isfinite(place))
+    if not stay:  # the reading comes back: as far as it went
+        size = float(np.median([course[np.argmax(np.abs(course))] for course in courses]))
+    return Jumps(wild + 1, size, place, stay)
 
 
 def _once_a_turn(angle: Array, first: NDArray[np.int64], size: float) -> tuple[float, bool]:

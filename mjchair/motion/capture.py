@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -65,7 +65,7 @@ def _captured(
     placed = in_chair(markers, chosen, bridged(markers.time, markers.positions))
     rest = None if static is None else _static(read_markers(static), markers, found)
     if rest is not None:
-        _check_person(placed.positions, rest, markers, chosen)
+        _check_person(placed.positions, rest, markers, chosen, str(static))
     motion = fit(markers.time, placed.positions, markers.names, chosen, build, rest, say)
     return replace(motion, notes=(*placed.notes, *motion.notes), speed=placed.speed)
 
@@ -80,16 +80,24 @@ def _static(still: Markers, run: Markers, chosen: MarkerSet) -> np.ndarray:
     return out
 
 
-def _check_person(run: np.ndarray, rest: np.ndarray, markers: Markers, chosen: MarkerSet) -> None:
+def _check_person(
+    run: np.ndarray, rest: np.ndarray, markers: Markers, chosen: MarkerSet, still: str
+) -> None:
     """Refuse a static trial of somebody else: arms of other lengths."""
     one = lengths_of(run, markers.names, chosen)
     other = lengths_of(rest, markers.names, chosen)
-    for segment in one.keys() & other.keys():
-        if abs(one[segment] / other[segment] - 1.0) > ALIKE:
-            raise MjchairError(
-                f"the static trial is of another person: its {segment} is "
-                f"{other[segment] / one[segment]:.2f} times that of the run"
-            )
+    segment = unlike(one, other)
+    if segment:
+        raise MjchairError(
+            f"{still}: the static trial is of another person: its {segment} is "
+            f"{other[segment] / one[segment]:.2f} times that of {markers.source}"
+        )
+
+
+def unlike(one: Mapping[str, float], other: Mapping[str, float]) -> str:
+    """The first segment whose lengths no single person has; "" where there is none."""
+    both = [segment for segment in one if segment in other]
+    return next((s for s in both if abs(one[s] / other[s] - 1.0) > ALIKE), "")
 
 
 def table_columns(motion: Motion) -> dict[str, np.ndarray]:

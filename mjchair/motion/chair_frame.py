@@ -77,6 +77,11 @@ def in_chair(markers: Markers, chosen: MarkerSet, positions: Array | None = None
             f"{markers.source}: no marker on the chair or the pelvis; name some in [chair] of the "
             "marker set: the person's motion is told against the chair"
         )
+    if not np.isfinite(positions[:, chair, 0]).any():
+        raise MjchairError(
+            f"{markers.source}: no marker on the chair or the pelvis was ever seen "
+            f"({', '.join(chosen.chair)}): the person's motion is told against the chair"
+        )
     up = _axis(chosen.up) if chosen.up else _up(markers, chosen, positions)
     center, heading = _chair_motion(positions[:, chair], up)
     way = _way(markers.time, center, heading, up)

@@ -1,7 +1,7 @@
 """The picture of a gathered study: the readings of all instruments for one motion, on one clock.
 
-In: the trials. Out: a figure with a row for each trial: wheel speeds on the left; torque, turning
-rate or what the wheels' sensors show on the right.
+In: the trials. Out: a figure with a row for each trial, those with a torque first: wheel speeds on
+the left; torque, turning rate or what the wheels' sensors show on the right.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ STYLES = ("-", "--", ":", "-.")
 
 def gathered_figure(trials: Sequence[GatheredTrial]) -> Figure:
     """Wheel speeds of all instruments, the torque after its baseline, and turning rates."""
-    shown = _different(trials)[:MOST]
+    shown = sorted(_different(trials), key=lambda trial: not trial.driven)[:MOST]
     figure = Figure(figsize=(12.0, ROW * len(shown) + 0.9), layout="constrained")
     axes = figure.subplots(len(shown), 2, squeeze=False)
     for trial, (left, right) in zip(shown, axes, strict=True):

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mjchair.errors import MjchairError, nearest
+from mjchair.errors import MjchairError, nearest, note
 from mjchair.measurement.gather.coasts import coasts
 from mjchair.measurement.gather.instruments import (
     RIDER_COLUMNS,
@@ -85,6 +85,7 @@ def gather(
         trials += _usable(_for_floor(trial, known), known)
     if not trials:
         raise MjchairError(f"{folder}: no trial with a motion that a study can use")
+    _ask_sides(trials)
     noise = _noise(trials)
     notes = [*dict.fromkeys(note for trial in trials for note in trial.notes)]
     notes += [
@@ -97,6 +98,18 @@ def gather(
     files = {"study.toml": text} | {f"{t.name}.csv": table_text(t) for t in trials}
     asked = known.missing(radius)
     return Gathered(files, tuple(trials), noise, tuple(notes), found.unused, asked)
+
+
+def _ask_sides(trials: Sequence[GatheredTrial]) -> None:
+    """Ask where names tell one side and signs the other; a gyroscope that turns tells itself."""
+    seen = [one for t in trials if "imu_gyro.z" not in t.columns for one in t.instruments]
+    names = sorted({one.name for one in seen if one.doubted})
+    if names:
+        note(
+            f"{', '.join(names)}: by name of one side and by signs of the other; are left and "
+            "right swapped, or did it roll backwards? The names are believed: rename the files, "
+            "or say it in gather.toml"
+        )
 
 
 def _about_markers(source: Source) -> str:

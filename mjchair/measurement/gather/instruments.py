@@ -47,7 +47,8 @@ class Instrument:
       gyroscope, accelerometer: (n, 3) of a sensor on the frame, in its own axes; None.
       trigger: time at which its trigger rises, s; None. free: (n,), without a hand; None.
       radius: of the wheel, m, from the file; None. ground: (n,) m/s, of the chair over the floor,
-        by markers; None. notes: one line each.
+        by markers; None. doubted: whether its signs are those of a wheel of the other side.
+      notes: one line each.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Instrument:
     free: NDArray[np.bool_] | None = None
     radius: float | None = None
     ground: Array | None = None
+    doubted: bool = False
     notes: tuple[str, ...] = ()
 
 
@@ -126,11 +128,12 @@ def _wheels(sources: list[Source]) -> list[Instrument]:
     found = []
     for side in ("left", "right"):
         mine = [i for i, (given, _) in enumerate(named) if given == side]
-        joint = _joint([signs[i] for i in mine], [runs[i][1] for i in mine])
+        joint = _joint(side, [signs[i] for i in mine], [runs[i][1] for i in mine])
         for i in mine:
             source, run = runs[i]
             rest = _rest(source, side, rests, single=len({s for s, _ in named}) == 1)
-            found.append(_wheel(source, run, (side, joint, named[i][1]), rest))
+            one = _wheel(source, run, (side, joint, named[i][1]), rest)
+            found.append(replace(one, doubted=signs[i].side == OTHER[side]))
     return found
 
 
@@ -168,11 +171,18 @@ def _sides(sources: list[Source], signs: list[Orientation]) -> list[tuple[str, s
     return out
 
 
-def _joint(signs: Sequence[Orientation], runs: Sequence[PushRim]) -> Orientation:
-    """The signs of one wheel from all its files: pushes tell, and what rolls furthest."""
+def _joint(side: str, signs: Sequence[Orientation], runs: Sequence[PushRim]) -> Orientation:
+    """The signs of one wheel from all its files: pushes tell, and what rolls furthest.
+
+    A run that goes backwards has the signs of the other side, and so has one whose sides are
+    swapped; neither tells, unless they are most of the runs.
+    """
     if not signs:
         return Orientation(1, 1, "", False)
     clear = [i for i, s in enumerate(signs) if s.clear]
+    agree = [i for i in clear if signs[i].side == side]
+    if agree and len(agree) >= sum(signs[i].side == OTHER[side] for i in clear):
+        clear = agree
     which = clear or range(len(signs))
     net = sum(float(runs[i].angle[-1] - runs[i].angle[0]) for i in which)
     travel = -1 if net < 0.0 else 1

@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 from mjchair.errors import MjchairError
 from mjchair.measurement import clocks, imu
 from mjchair.measurement.clocks import Alignment, Signal
-from mjchair.measurement.gather.instruments import Instrument, shifted
+from mjchair.measurement.gather.instruments import RADIUS, Instrument, shifted
 from mjchair.simulation.table import SAME, Table, merged
 
 Array = NDArray[np.float64]
 
 LEAST = 1.0  # s, of a trial
+GAP = 0.2  # s, in which the chair is not seen, beyond which its speed there is not known
+ENOUGH = 4.0  # s, of the chair seen without a gap, that tell a clock alone
 RESTS = 0.05  # rad/s of a wheel, below which the chair stands
 TURNS = 0.03  # rad/s rms, of a turning by which sides are checked
 
@@ -114,7 +116,12 @@ def _align(ours: Sequence[Instrument], other: Instrument) -> Alignment:
             f"turns; give the offset of {names[1]} with --offset FILE=SECONDS"
         )
     if other.speed is not None:
-        return clocks.align(*_of_wheels(ours, other), names)
+        one, two = _of_wheels(ours, other)
+        driven = any(w.torque for w in (*ours, other))
+        if driven or clocks.best_alignment(one, two).clear:
+            return clocks.align(one, two, names)
+        slowing = clocks.align_slowing(one, _in_unit_of(reference, other, two))
+        return slowing or clocks.align(one, two, names)
     if other.accelerometer is None:
         raise MjchairError(
             f"the clocks of {names[0]} and {names[1]} cannot be aligned: {names[1]} shows no "
@@ -131,11 +138,30 @@ def _of_wheels(ours: Sequence[Instrument], other: Instrument) -> tuple[Signal, S
     """
     twin = next((one for one in ours if one.side == other.side and one.speed is not None), None)
     one = twin or ours[0]
-    assert one.speed is not None and other.speed is not None
     if twin is None and one.torque and other.torque:
         first, second = (next(iter(w.torque.values())) for w in (one, other))
         return Signal(one.time, first), Signal(other.time, second)
-    return Signal(one.time, one.speed), Signal(other.time, other.speed)
+    return _course(one), _course(other)
+
+
+def _course(one: Instrument) -> Signal:
+    """The speed of a wheel; of markers, where the chair is seen longest without a gap."""
+    assert one.speed is not None
+    if one.ground is None:
+        return Signal(one.time, one.speed)
+    seen = np.flatnonzero(np.isfinite(one.ground))
+    parts = np.split(seen, np.flatnonzero(np.diff(one.time[seen]) > GAP) + 1)
+    longest = max(parts, key=len)
+    if np.ptp(one.time[longest]) < ENOUGH:
+        longest = np.arange(one.time.size)
+    return Signal(one.time[longest], one.speed[longest])
+
+
+def _in_unit_of(reference: Instrument, other: Instrument, speed: Signal) -> Signal:
+    """The speed of another instrument; of markers, as that of the reference's wheel."""
+    if other.ground is None or reference.radius is None:
+        return speed
+    return Signal(speed.time, speed.values * RADIUS / reference.radius)
 
 
 def _gained(ours: Sequence[Instrument]) -> Signal:

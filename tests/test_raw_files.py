@@ -1,0 +1,198 @@
+"""Files of a laboratory, of a planar person, by a generator that knows nothing of the package."""
+
+import contextlib
+import dataclasses
+import io
+
+import numpy as np
+import pytest
+from five_segments import Chair, Hidden, Person
+from lab_formats import Rim, Style
+from raw_files import (
+    LATE,
+    TORQUE,
+    Plan,
+    clocks,
+    gather_command,
+    moved_share,
+    write,
+    write_static,
+)
+
+import mjchair
+from mjchair.cli import main
+from mjchair.commands.gather import _of_markers
+from mjchair.errors import MjchairError, MjchairNote
+from mjchair.measurement.clocks import Signal, align_slowing
+from mjchair.measurement.gather.gather import gather
+from mjchair.measurement.gather.known import Known
+from mjchair.report.gathered import gathered_figure
+
+PLAN = Plan(Person(torque=TORQUE), Hidden(rolling=0.005), pushes=1, coasts=0, seconds=6.0)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """One pushed run: the folder, and what truly happened."""
+    place = tmp_path_factory.mktemp("raw")
+    return place, write(PLAN, place / "raw", place / "truth")
+
+
+@pytest.fixture(scope="module")
+def gathered(made):
+    """The trial of the gathered study, and what gather printed."""
+    place, _ = made
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        assert main(gather_command(PLAN, place / "raw", place / "study")) == 0
+    return mjchair.read_study(place / "study").runs[0].trial, said.getvalue()
+
+
+@pytest.fixture
+def rims(tmp_path):
+    """A function that writes a plan's rims, without markers, and gives their folder and runs."""
+
+    def make(**changes):
+        plan = dataclasses.replace(PLAN, **changes)
+        runs = write(plan, tmp_path / "raw", tmp_path / "truth")
+        for path in (tmp_path / "raw").glob("*.c3d"):
+            path.unlink()
+        return tmp_path / "raw", runs
+
+    return make
+
+
+def test_wheels_come_back_with_their_signs_speed_and_torque(made, gathered):
+    _, (run,) = made
+    trial, _ = gathered
+    inputs = trial.inputs
+    for side in ("left", "right"):
+        torque = inputs.controls[f"{side}_wheel"]
+        there = np.isfinite(torque)
+        true = run.hand(inputs.time[there] + LATE["right"])
+        assert abs(np.mean(torque[there] - true)) < 0.05  # the offset of 0.25 N m is taken off
+        assert np.std(torque[there] - true) < 0.15  # noise of 0.12 N m
+        angle = trial.channels[f"{side}_wheel_angle"]
+        there = np.isfinite(angle)
+        true = run.way(trial.time[there] + LATE["right"]) / Chair().rear_radius
+        assert true[-1] > 3.0
+        assert np.std(angle[there] - true) < 0.002  # rad; a tick is 0.0015
+
+
+def test_clocks_and_the_persons_motion_come_back(made, gathered):
+    place, runs = made
+    found = clocks(gathered[1])
+    assert found["right"]["push1"] == pytest.approx(LATE["right"], abs=0.003)
+    assert found["markers"]["push1"] == pytest.approx(LATE["markers"], abs=0.005)
+    # segments of Winter seen as those of de Leva: not quite the displacement that truly was
+    assert 0.85 < moved_share(place / "study", place / "truth", runs) < 1.05
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"style": Style(semicolon=True, columns=25)},
+        {"style": Style(wrap=False), "rim": Rim(jump=40)},
+        {"start": 0.9},
+    ],
+    ids=["25 columns, decimal commas", "an encoder that jumps", "rolling at first, no baseline"],
+)
+def test_worse_files_of_the_same_motion_give_the_same(changes, rims):
+    raw, (run,) = rims(**changes)
+    if "start" in changes:
+        for path in raw.glob("baseline*"):
+            path.unlink()
+    (trial,) = gather(raw, Known(mass=90.0)).trials
+    for side in ("left", "right"):
+        there = np.isfinite(trial.columns[f"{side}_wheel"])
+        off = trial.columns[f"{side}_wheel"] - run.hand(trial.time + LATE["right"])
+        assert abs(np.mean(off[there])) < 0.05 and np.std(off[there]) < 0.15
+        there = np.isfinite(trial.columns[f"{side}_wheel_angle"])
+        true = run.way(trial.time[there] + LATE["right"]) / Chair().rear_radius
+        assert np.std(trial.columns[f"{side}_wheel_angle"][there] - true) < 0.002
+
+
+def test_a_coast_that_never_stops_has_one_clock(rims):
+    """A straight line has no lag of its own; two wheels of a chair have one speed."""
+    raw, _ = rims(pushes=0, coasts=1)
+    (trial,) = gather(raw, Known(mass=90.0)).trials
+    found = trial.alignments["coast1_right.csv"]
+    assert found.how == "equal speed as it slows"
+    assert abs(found.offset - LATE["right"]) < 0.01 < found.offset_std < 0.1
+
+
+def test_equal_speed_tells_a_clock_only_where_a_chair_slows_alike():
+    rng = np.random.default_rng(2)
+    time = np.arange(0.0, 8.0, 0.01)
+
+    def seen(speed):
+        return Signal(time, speed + 0.005 * rng.normal(size=time.size))
+
+    def found(slope):
+        return align_slowing(seen(4.0 - slope * time), seen(4.0 - slope * (time + 0.2)))
+
+    assert found(0.4).offset == pytest.approx(0.2, abs=0.01)
+    assert found(0.05) is None  # 1 % of the speed is 0.7 s of it
+    assert align_slowing(seen(4.0 - 0.4 * time), seen(3.9 - 0.2 * time)) is None  # another floor
+    assert align_slowing(seen(1.0 + 0.4 * time), seen(1.1 + 0.4 * time)) is None
+
+
+def test_swapped_names_are_asked_about(rims):
+    raw, _ = rims()
+    for one in ("push1", "baseline"):
+        left, right = raw / f"{one}_left.csv", raw / f"{one}_right.csv"
+        content = left.read_bytes(), right.read_bytes()
+        left.write_bytes(content[1])
+        right.write_bytes(content[0])
+    with pytest.warns(MjchairNote, match=r"push1_left\.csv, push1_right\.csv: .* swapped, or"):
+        gather(raw, Known(mass=90.0))
+
+
+def test_a_trial_whose_sides_are_swapped_does_not_turn_the_others(rims):
+    raw, (run, other) = rims(pushes=2, seconds=9.5)
+    assert other.way(9.5) > run.way(9.5)
+    left, right = raw / "push2_left.csv", raw / "push2_right.csv"  # the run that goes farther
+    content = left.read_bytes(), right.read_bytes()
+    left.write_bytes(content[1])
+    right.write_bytes(content[0])
+    with pytest.warns(MjchairNote, match=r"^push2_left\.csv, push2_right\.csv: .* swapped, or"):
+        one, _ = gather(raw, Known(mass=90.0)).trials
+    there = np.isfinite(one.columns["left_wheel"])
+    off = one.columns["left_wheel"] - run.hand(one.time + LATE["right"])
+    assert np.std(off[there]) < 0.15
+
+
+def test_a_chair_that_is_not_seen_for_a_while_still_tells_its_clock(rims):
+    raw, (run,) = rims(seconds=10.0)
+    time = np.arange(0.0, 10.0 - LATE["markers"], 0.01)
+    truly = time + LATE["markers"]
+    speed = np.interp(truly, run.rolled.time, run.rolled.speed)
+    speed[(truly > 2.0) & (truly < 4.5)] = np.nan
+    rows = np.column_stack([time, np.sin(time), speed])
+    lines = [",".join("" if x != x else f"{x:.6g}" for x in row) for row in rows]
+    text = "\n".join(["time,rider_motion,chair_speed", *lines])
+    (raw / "push1_rider.csv").write_text(text)
+    (trial,) = gather(raw, Known(mass=90.0)).trials
+    found = trial.alignments["push1_rider.csv"]
+    assert found.offset == pytest.approx(LATE["markers"], abs=0.005)
+
+
+def test_runs_of_two_persons_are_not_put_into_one_study(tmp_path):
+    rng = np.random.default_rng(0)
+    for name, stature in (("short", 1.75), ("tall", 2.0)):
+        (tmp_path / name).mkdir()
+        person = dataclasses.replace(PLAN.person, stature=stature)
+        write_static(dataclasses.replace(PLAN, person=person), tmp_path / name, rng)
+    read = _of_markers(Known())
+    read(tmp_path / "short" / "static.c3d", None)
+    read(tmp_path / "short" / "static.c3d", None)
+    with pytest.raises(MjchairError, match=r"of another person than .* is 1\.1. times as long"):
+        read(tmp_path / "tall" / "static.c3d", None)
+
+
+def test_pushes_are_drawn_before_coasts(rims):
+    raw, _ = rims(coasts=1)
+    found = gather(raw, Known(mass=90.0))
+    assert [trial.name for trial in found.trials] == ["coast1", "push1"]
+    titles = [axes.get_title(loc="left") for axes in gathered_figure(found.trials).axes[::2]]
+    assert [title.split("\n")[0] for title in titles] == ["push1", "coast1"]
