@@ -1,5 +1,6 @@
 """The columns of a fit: by how little a parameter is moved for one, and which are rounding."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -120,9 +121,38 @@ def test_a_fit_that_stays_worse_than_a_part_of_it_is_not_followed(most, looked, 
     monkeypatch.setattr(nonlinear, "_around", around)
     monkeypatch.setattr(nonlinear, "_after_linear_step", lambda *_: None)
     monkeypatch.setattr(nonlinear, "_between", lambda *_: None)
-    bench = SimpleNamespace(simulator=None)
-    found = nonlinear.refit(bench, None, None, {}, most=most)
+    monkeypatch.setattr(nonlinear, "_nearer", lambda _, here, *__: here)
+    bench, part = SimpleNamespace(simulator=None), SimpleNamespace(total=most)
+    found = nonlinear.refit(bench, None, None, {}, part=part)
     assert found.total == 1001.0 - looked
+
+
+def test_a_start_that_fits_worse_than_a_part_of_its_effects_is_moved_towards_it(monkeypatch):
+    """Linear algebra asks for a tire without friction; a tenth less helps, a half does not."""
+    friction = library.find("tire_friction")
+    rolling = Term(library.find("rolling_resistance"), {"coefficient": 0.004}, ("coefficient",))
+    tried = []
+
+    def around(bench, variant, *_):
+        less = 1.0 - variant.terms[1].values["factor"]
+        tried.append(round(less, 6))
+        assert variant.terms[0].values["coefficient"] <= 0.005
+        total = 1e6 if less > 0.2 else 100.0 - 50.0 * less
+        return SimpleNamespace(total=total, promised=total, track=None, std={}, variant=variant)
+
+    monkeypatch.setattr(nonlinear, "_around", around)
+    monkeypatch.setattr(nonlinear, "_after_linear_step", lambda _, best: best.variant)
+    start = Variant(
+        (),
+        terms=(
+            replace(rolling, values={"coefficient": 0.005}),
+            Term(friction, {"factor": 0.02}, ("factor",)),
+        ),
+    )
+    part = SimpleNamespace(total=100.0, variant=Variant((), terms=(rolling,)))
+    found = nonlinear.refit(SimpleNamespace(simulator=None), start, None, {}, part=part)
+    assert found.total < 100.0
+    assert tried[:3] == [0.98, round(0.3 * 0.98, 6), round(0.1 * 0.98, 6)]
 
 
 def test_after_a_short_step_the_next_is_twice_as_long_and_not_whole(monkeypatch):

@@ -28,6 +28,7 @@ from mjchair.errors import MjchairError
 
 Array = NDArray[np.float64]
 WAVE = 10.0  # N, amplitude of a wave's columns
+BEYOND = 2.0  # times its bounds: no effect is as large
 ROLLS = 0.05  # m/s, above which a brake acts in full
 
 
@@ -60,6 +61,21 @@ class Start:
                 if c < 0.0 and p.neutral in (p.low, p.high):
                     return False
         return not (coefficients < self.least).any()
+
+    def can_be(self, coefficients: Array) -> bool:
+        """Whether the sizes that coefficients ask for lie within BEYOND times the bounds.
+
+        Where they do not, what linear algebra promises is far from what the effect can bring.
+        """
+        if self.effect.seeds is not None or len(coefficients) != len(self.free):
+            return True
+        for c, name in zip(coefficients, self.free, strict=True):
+            p = self.effect.parameter(name)
+            by = float(c) * step(p)
+            room = p.high - p.neutral if by > 0.0 else p.neutral - p.low
+            if p.sized and abs(by) > BEYOND * room:
+                return False
+        return True
 
 
 @dataclass

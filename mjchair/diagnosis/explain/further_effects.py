@@ -137,7 +137,7 @@ def _promising(base: Base, here: Explained, reduced: Reduced) -> list[tuple[Hypo
     weighed = []
     brought = _brought(base, here, reduced)
     for h in options:
-        if not _beyond_form(reduced, h, brought + h.gain):
+        if not _beyond_form(reduced, h, brought + h.gain) or not hypotheses.can_be(reduced, h):
             continue
         columns: dict[ColumnId, Column] = {**own, **{c: base.columns[c] for c in h.columns}}
         bench, deviance = _noise(base, here.fitted, columns)

@@ -85,6 +85,12 @@ def physical(reduced: Reduced, hypothesis: Hypothesis) -> bool:
     return all(start.allows(mine) for start, mine in _split(hypothesis, coefficients))
 
 
+def can_be(reduced: Reduced, hypothesis: Hypothesis) -> bool:
+    """Whether no linear coefficient asks for an effect far beyond its bounds."""
+    coefficients = reduced.solve(reduced.index(hypothesis.columns))
+    return all(start.can_be(mine) for start, mine in _split(hypothesis, coefficients))
+
+
 def _split(hypothesis: Hypothesis, coefficients: Array) -> list[tuple[Start, Array]]:
     out, at = [], 0
     for start in hypothesis.starts:
@@ -152,7 +158,7 @@ def grown(
             if weighed.keys not in best or weighed.score > best[weighed.keys].score:
                 best[weighed.keys] = weighed
     ordered = sorted(best.values(), key=lambda h: -h.score)[:SHORTLIST]
-    return [h for h in ordered if physical(reduced, h)]
+    return [h for h in ordered if physical(reduced, h) and can_be(reduced, h)]
 
 
 def _options(reduced: Reduced, starts: Sequence[Start]) -> list[Start]:

@@ -142,12 +142,11 @@ class MultiStart:
           MjchairError: there no chair can be.
         """
         base = self.base
-        most = np.inf if self.part is None else self.part.total
         if self.near is not None:
-            return self.near.refit(self.hypothesis.starts, rounds, most)
+            return self.near.refit(self.hypothesis.starts, rounds, self.part)
         terms = hypotheses.terms(base.reduced, self.hypothesis, share)
         start = replace(base.around.variant, terms=terms)
-        return refit(base.bench, start, base.around.track, base.nuisances, rounds, most)
+        return refit(base.bench, start, base.around.track, base.nuisances, rounds, self.part)
 
     def _terms(self) -> tuple[Term, ...]:
         """The effects with the values that linear algebra promises."""

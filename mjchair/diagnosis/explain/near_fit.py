@@ -57,20 +57,21 @@ class NearFit:
             at += count
         return tuple(out)
 
-    def refit(self, starts: Sequence[Start], rounds: int, most: float) -> Fitted:
-        """The nonlinear fit that begins there; `rounds` and `most` as `refit` takes them."""
+    def refit(self, starts: Sequence[Start], rounds: int, part: Fitted | None) -> Fitted:
+        """The nonlinear fit that begins there; `rounds` and `part` as `refit` takes them."""
         near = self.found.fitted
         start = replace(near.variant, terms=self.terms(starts))
         known = nuisances_of(self.base, near)
-        return refit(self.base.bench, start, near.track, known, rounds, most)
+        return refit(self.base.bench, start, near.track, known, rounds, part)
 
     def physical(self, starts: Sequence[Start]) -> bool:
-        """Whether what is new lies on the allowed side of its parameters."""
+        """Whether what is new lies on the allowed side of its parameters, not far beyond them."""
         _, values, _ = self._solved(starts)
         at = 0
         for start in starts:
             count = len(self._columns(start))
-            if not self._is_in(start) and not start.allows(values[at : at + count]):
+            mine = values[at : at + count]
+            if not self._is_in(start) and not (start.allows(mine) and start.can_be(mine)):
                 return False
             at += count
         return True

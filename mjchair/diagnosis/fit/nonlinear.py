@@ -35,6 +35,8 @@ FEW = 3  # of these, after which a fit that has gone astray is not followed
 SHORTEST = 1.0 / 32.0  # of a step: where that fails as well, none is believed
 SHORTER = (0.1, 0.5)  # of a step that fails: the least and the most that is tried next
 LONGER = 2.0  # times the share of a step that brought something, for the next
+NEARER = (0.3, 0.1, 0.03)  # of the way from a part of the effects to a start that fits worse
+FAILS = 3  # steps in a row that bring nothing, after which a fit ends
 DONE = 1.0  # chi2 that a further round must promise
 ROUGH = 10.0  # chi2 promised, below which a fit ends where a round brings less than half of DONE
 
@@ -75,7 +77,7 @@ def refit(
     before: Track | None,
     nuisances: dict[ColumnId, Column] | None = None,
     rounds: int = ROUNDS,
-    most: float = np.inf,
+    part: Fitted | None = None,
 ) -> Fitted:
     """Nonlinear fit of nuisances and effects within bounds: Gauss-Newton with a line search.
 
@@ -84,8 +86,9 @@ def refit(
       nuisances: columns to use throughout, with the answers to the slow state of `before`; None:
         both are made anew at `start`. The residual, which decides where the fit ends, is always
         new.
-      most: chi2 that a part of the effects reaches. With more effects nothing fits worse, so a fit
-        that still does after a few rounds has gone astray.
+      part: a fit of some of the effects; None: none is known. With more effects nothing fits worse,
+        so a start that does is moved towards it, and a fit that still does after a few rounds has
+        gone astray.
 
     Raises:
       MjchairError: `start` is no chair that can be: it does not compile, or its simulation fails.
@@ -97,8 +100,11 @@ def refit(
         before = track(simulator, model, bench.noise, errors, before, anew=True)
         nuisances = nuisance_columns(bench, before, start)
     best = _around(bench, start, before, nuisances)
+    most = np.inf if part is None else part.total
+    if part is not None and best.total > most:
+        best = _nearer(bench, best, part, before, nuisances)
     variant = _after_linear_step(bench, best)
-    share = 1.0  # of the linear step, that is tried
+    share, fails = 1.0, 0  # of the linear step, that is tried
     for k in range(rounds):
         # columns that were made anew are followed once, however little they promise
         done = best.total - best.promised < DONE and not (anew and k == 0)
@@ -110,18 +116,56 @@ def refit(
             shorter = SHORTER[1]
         else:
             if here.total < best.total:
-                brought, best = best.total - here.total, here
+                brought, best, fails = best.total - here.total, here, 0
                 if brought < 0.5 * DONE and here.total - here.promised < ROUGH:
                     break
                 share = min(LONGER * share, 1.0)
                 variant = _between(here.variant, _after_linear_step(bench, here), share)
                 continue
             shorter = _shorter(best, here.total, share)
-        if share <= SHORTEST:
+        fails += 1
+        if share <= SHORTEST or fails == FAILS:
             break
         shorter = max(shorter, SHORTEST / share)
         share, variant = share * shorter, _between(best.variant, variant, shorter)
     return best
+
+
+def _nearer(
+    bench: Bench,
+    here: Fitted,
+    part: Fitted,
+    before: Track | None,
+    nuisances: dict[ColumnId, Column],
+) -> Fitted:
+    """A place between a start and a part of its effects that fits as well as that, or the best.
+
+    The size that linear algebra promises of an effect may be absurd: a tire without friction.
+    """
+    known = {term.effect.key: term for term in part.variant.terms}
+    terms = tuple(
+        replace(t, values=known[t.effect.key].values) if t.effect.key in known else _neutral(t)
+        for t in here.variant.terms
+    )
+    least, far = replace(here.variant, offsets=part.variant.offsets, terms=terms), here.variant
+    for share in NEARER:
+        try:
+            there = _around(bench, _between(least, far, share), before, nuisances)
+        except (MjchairError, np.linalg.LinAlgError):  # of what no chair can be
+            continue
+        here = min(here, there, key=lambda f: f.total)
+        if here.total <= part.total:
+            break
+    return here
+
+
+def _neutral(term: Term) -> Term:
+    """The effect of no size, in the place and at the time where it is."""
+    return replace(
+        term,
+        values=term.values
+        | {p.name: p.neutral for p in term.effect.parameters if p.sized and p.name in term.free},
+    )
 
 
 def _around(
