@@ -13,8 +13,10 @@ from mjchair.diagnosis.fit import process
 from mjchair.diagnosis.fit.process import KINDS, Part, Process
 from mjchair.diagnosis.replay.person_force import person_force
 from mjchair.diagnosis.replay.pulses import Force, Pulse
+from mjchair.diagnosis.replay.simulator import WindowSimulator
+from mjchair.errors import MjchairError
 from mjchair.measurement.trial import Trial
-from mjchair.model import moving_share
+from mjchair.model import inertials, moving_share
 from mjchair.simulation.inputs import Inputs
 
 TIME = np.arange(0.0, 10.0, 0.01)
@@ -90,3 +92,16 @@ def test_a_wheel_that_is_not_round_pushes_once_a_turn_in_one_phase():
     np.testing.assert_allclose(cover, np.cos(3.0 * (time[:, None] - time)), atol=1e-12)
     assert np.linalg.matrix_rank(cover, tol=1e-9) == 2
     assert not made.correlation(which, Part.CASTER_TURN).any()
+
+
+@pytest.mark.parametrize("inertia", [(-1.0, 1.0, 1.0), (1.0, 1.0, 3.0)])
+def test_a_body_that_cannot_be_is_said_in_plain_words(inertia):
+    """As much of a person may be asked to move as leaves a chair of no mass."""
+
+    def edit(spec):
+        body = inertials.explicit(spec, "chair")
+        body.mass, body.inertia, body.fullinertia = 10.0, inertia, [np.nan] * 6
+
+    with pytest.raises(MjchairError, match="a mass or an inertia that no body has") as error:
+        WindowSimulator(study(run())).compile(edit)
+    assert "\n" not in str(error.value) and "mjMINVAL" not in str(error.value)

@@ -32,6 +32,7 @@ from mjchair.rider import driven_joint
 from mjchair.simulation import batch, names
 
 Array = NDArray[np.float64]
+NO_BODY = ("mjMINVAL", "A + B >= C")  # MuJoCo's words for it
 FORCE = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
 
 
@@ -118,6 +119,8 @@ class WindowSimulator:
             raise
         except (ValueError, mujoco.FatalError) as error:
             line = " ".join(str(error).split())
+            if any(words in line for words in NO_BODY):
+                line = "it asks for a mass or an inertia that no body has"
             raise MjchairError(f"an effect does not compile: {line}") from None
 
     def coarsened(self, model: mujoco.MjModel) -> mujoco.MjModel:
