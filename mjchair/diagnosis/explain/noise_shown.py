@@ -24,6 +24,7 @@ from mjchair.diagnosis.fit.noise_levels import Levels
 from mjchair.diagnosis.fit.process import NAMED, Part, Process
 from mjchair.diagnosis.replay import derivatives
 from mjchair.diagnosis.replay.derivatives import Column
+from mjchair.diagnosis.replay.measured_motion import motions
 from mjchair.diagnosis.replay.noise import EDGES
 from mjchair.diagnosis.replay.pulses import Force, Pulse
 from mjchair.diagnosis.replay.simulator import WindowSimulator
@@ -36,9 +37,9 @@ Array = NDArray[np.float64]
 SPREAD = {Force.FORWARD: 10.0, Force.YAW: 3.0}  # N, N m: prior of a force that goes with something
 SCALE = 0.1  # prior of a sensor's scale, 1
 SHAKES = 0.3  # of the chair's own rolling resistance: what shakes it harder has a cause
-# of a moving person's force, that is in no model: markers on skin tell a centre of mass to some
-# per cent, and strokes of one person differ by about a tenth (assumption)
-UNLIKE = 0.1
+# of a moving person's force, that is in no model (assumptions): markers on skin tell a centre of
+# mass to some per cent; without them strokes, of which no two are alike, have one course
+UNLIKE, STROKES_UNLIKE = 0.1, 0.2
 SHAKING = tuple(name for name in NAMED if name != "person")  # what shakes a chair
 HUSH = 0.05  # of a level: nearly nothing
 SIZES = 5.0  # sizes worth finding: prior of the best hypothesis
@@ -89,7 +90,8 @@ def loudness(bench: Bench) -> float:
     """Power of what shakes the chair, over the most that is believed of it; its loudest force."""
     assert bench.process is not None
     most, levels = _most(bench.simulator), bench.process.levels
-    return max((process.level(levels, name) / most[NAMED[name][0][0]]) ** 2 for name in SHAKING)
+    of_most = [process.level(levels, n) / float(most[NAMED[n][0][0]].max()) for n in SHAKING]
+    return max(of_most) ** 2
 
 
 def hushed(bench: Bench) -> Bench:
@@ -131,15 +133,18 @@ def _estimated(
     return Bench(simulator, noise, bench.nuisances, process), how_far
 
 
-def _most(simulator: WindowSimulator) -> dict[Part, float]:
-    """The largest levels of what shakes a chair: shares of its own rolling resistance, N or N m.
+def _most(simulator: WindowSimulator) -> dict[Part, Array]:
+    """The largest levels (runs,) of what shakes a chair: shares of its own rolling resistance.
 
-    Of what a moving person does besides, a share of that person's force.
+    N or N m. Of what a moving person does besides, a share of that person's force.
     """
     own = own_resistance(simulator.study.spec)
     half = 0.5 * rear_axle(simulator.base).track
     drive = SHAKES * own
-    most = dict.fromkeys(NAMED, drive) | {"side": own, "yaw": drive * half, "person": UNLIKE}
+    runs = simulator.study.runs
+    most = {name: np.full(len(runs), drive) for name in NAMED}
+    most["side"], most["yaw"] = np.full(len(runs), own), most["yaw"] * half
+    most["person"] = np.array([UNLIKE if motions(run) else STROKES_UNLIKE for run in runs])
     return {part: most[name] for name, (parts, _) in NAMED.items() for part in parts}
 
 

@@ -151,15 +151,16 @@ def estimate(
     least: Array,
     fixed: frozenset[Part] = frozenset(),
     steps: int = STEPS,
-    most: Mapping[Part, float] | None = None,
+    most: Mapping[Part, Array] | None = None,
 ) -> Levels:
     """The most probable levels.
 
     Args:
       windows: that may be fitted to. first: where to begin.
       least: (channels, bands), the least power of a sensor, over that of the first guess.
-      fixed: parts whose level is known. most: part -> its largest level, N or N m (1 of PERSON);
-        None: any. What shakes a chair harder is something missing.
+      fixed: parts whose level is known.
+      most: part -> its largest levels (runs,), N or N m (1 of PERSON); None: any. What shakes a
+        chair harder is something missing.
     """
     levels = first
     for _ in range(steps):
@@ -169,7 +170,7 @@ def estimate(
     return levels
 
 
-def _within(levels: Levels, most: Mapping[Part, float], fixed: frozenset[Part]) -> Levels:
+def _within(levels: Levels, most: Mapping[Part, Array], fixed: frozenset[Part]) -> Levels:
     """The levels, none larger than what noise can be."""
     parts = {
         part: level if part in fixed else np.minimum(level, most.get(part, np.inf))
