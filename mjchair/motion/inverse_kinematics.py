@@ -63,6 +63,7 @@ class Motion:
         chair frame. names: of the markers. qpos: (n, joints), rad, with the joints that no marker
         tells at the chair's posture. notes: one line each. model: of the rider in the chair.
         speed: (n,), m/s, of the chair over the floor, NaN where it was not seen; None: not told.
+        heading: (n,), rad, in the laboratory, as in `chair_frame`; the same.
     """
 
     time: Array
@@ -76,6 +77,7 @@ class Motion:
     notes: tuple[str, ...]
     model: mujoco.MjModel
     speed: Array | None = None
+    heading: Array | None = None
 
 
 @dataclass

@@ -20,10 +20,11 @@ from mjchair.measurement.gather.instruments import (
     ReadsMarkers,
     read_instruments,
 )
-from mjchair.measurement.gather.join import GatheredTrial, join
+from mjchair.measurement.gather.join import GatheredTrial, heading_at, join
 from mjchair.measurement.gather.known import Known
 from mjchair.measurement.gather.sources import Source, find_sources
 from mjchair.measurement.gather.study_file import study_text
+from mjchair.measurement.gather.together import started_together
 from mjchair.measurement.gather.without_torque import estimated
 
 Array = NDArray[np.float64]
@@ -79,13 +80,18 @@ def gather(
         raise MjchairError(
             f"{folder}: no wheel, no sensor on the frame and no markers among its files"
         )
-    trials = []
-    for name in names:
-        trial = join(name, [one for one in instruments if one.source.trial == name])
-        trials += _usable(_for_floor(trial, known), known)
+    mine = {name: [one for one in instruments if one.source.trial == name] for name in names}
+    joined = [join(name, mine[name]) for name in names]
+    agreed, shared = started_together(joined)
+    trials: list[GatheredTrial] = []
+    for name, trial in zip(names, joined, strict=True):
+        same = join(name, mine[name], agreed[name]) if name in agreed else trial
+        trials += _usable(_for_floor(same, known), known)
     if not trials:
         raise MjchairError(f"{folder}: no trial with a motion that a study can use")
     _ask_sides(trials)
+    if known.floor not in RUNS_OFF_FLOOR:
+        trials = _headed(trials)
     noise = _noise(trials)
     notes = [*dict.fromkeys(note for trial in trials for note in trial.notes)]
     notes += [
@@ -94,7 +100,8 @@ def gather(
     if of_markers is None:
         notes += [_about_markers(s) for s in sources if s.kind == "markers"]
     radius = next((one.radius for one in instruments if one.radius is not None), None)
-    text = study_text(trials, noise, known, radius)
+    notes += shared
+    text = study_text(trials, noise, known, radius, shared)
     files = {"study.toml": text} | {f"{t.name}.csv": table_text(t) for t in trials}
     asked = known.missing(radius)
     return Gathered(files, tuple(trials), noise, tuple(notes), found.unused, asked)
@@ -169,6 +176,26 @@ def _cut(trial: GatheredTrial, name: str, span: tuple[float, float], said: str) 
     return replace(
         trial, name=name, time=time, columns=columns, manoeuvre="coast", notes=(*trial.notes, said)
     )
+
+
+def _headed(trials: Sequence[GatheredTrial]) -> list[GatheredTrial]:
+    """The trials with the heading at which they begin, where markers show it.
+
+    x is the axis of the laboratory that is nearest to where the chair faces as the first trial
+    begins, z is up; headings are from a quarter turn to the right to three quarters to the left.
+    """
+    told = [heading_at(trial.instruments, trial.begin + trial.time[0]) for trial in trials]
+    first = next((angle for angle in told if angle is not None), None)
+    if first is None:
+        return list(trials)
+    quarter = 0.5 * np.pi
+    zero = quarter * round(first / quarter)
+    return [
+        trial
+        if angle is None
+        else replace(trial, heading=float((angle - zero + quarter) % (4.0 * quarter) - quarter))
+        for trial, angle in zip(trials, told, strict=True)
+    ]
 
 
 def _noise(trials: Sequence[GatheredTrial]) -> dict[str, float]:

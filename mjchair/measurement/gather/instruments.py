@@ -29,7 +29,8 @@ OTHER = {"left": "right", "right": "left"}
 COAST = 0.98  # share of a rolling recording without a hand, above which it is a coast
 SMOOTH = 0.1  # s, of the local parabola that turns a table's angle into speed
 CHAIR_SPEED = "chair_speed"  # m/s, a column of a rider's motion
-RIDER_COLUMNS = {*JOINT_NAMES, "rider_motion", CHAIR_SPEED}
+CHAIR_HEADING = "chair_heading"  # rad, in the laboratory, the same
+RIDER_COLUMNS = {*JOINT_NAMES, "rider_motion", CHAIR_SPEED, CHAIR_HEADING}
 RADIUS = 0.3  # m, of a rear wheel where nothing tells it: 24 inches
 SEEN = 0.7  # share of the time below which it is said how little of the chair is seen
 # a file of markers and the static trial beside it -> the table of the rider's motion, and notes
@@ -47,7 +48,8 @@ class Instrument:
       gyroscope, accelerometer: (n, 3) of a sensor on the frame, in its own axes; None.
       trigger: time at which its trigger rises, s; None. free: (n,), without a hand; None.
       radius: of the wheel, m, from the file; None. ground: (n,) m/s, of the chair over the floor,
-        by markers; None. doubted: whether its signs are those of a wheel of the other side.
+        by markers; None. facing: (n,) rad, of its forward axis in the laboratory, the same.
+        doubted: whether its signs are those of a wheel of the other side.
       notes: one line each.
     """
 
@@ -64,6 +66,7 @@ class Instrument:
     free: NDArray[np.bool_] | None = None
     radius: float | None = None
     ground: Array | None = None
+    facing: Array | None = None
     doubted: bool = False
     notes: tuple[str, ...] = ()
 
@@ -101,6 +104,7 @@ def _rider(source: Source, table: Table, notes: Sequence[str] = ()) -> Instrumen
     """The motion of a rider: joints (rad), centre of mass (m), and the chair's speed (m/s)."""
     time, columns = np.asarray(table.time), dict(table.columns)
     ground = columns.pop(CHAIR_SPEED, None)
+    facing = columns.pop(CHAIR_HEADING, None)
     name = source.path.name
     said = [f"{name}: {note}" for note in notes]
     told = sum(column in JOINT_NAMES for column in columns)
@@ -112,7 +116,9 @@ def _rider(source: Source, table: Table, notes: Sequence[str] = ()) -> Instrumen
             said.append(f"{name}: the chair is seen in {there.mean():.0%} of the time")
         # a wheel of the usual radius; clocks are put together by its course alone
         speed = np.interp(time, time[there], ground[there]) / RADIUS
-    return Instrument(name, source, time, columns, speed=speed, ground=ground, notes=tuple(said))
+    return Instrument(
+        name, source, time, columns, speed=speed, ground=ground, facing=facing, notes=tuple(said)
+    )
 
 
 def _wheels(sources: list[Source]) -> list[Instrument]:
