@@ -40,12 +40,12 @@ def made(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def gathered(made):
-    """The trial of the gathered study, and what gather printed."""
+    """The trial of the gathered study, and gather's log."""
     place, _ = made
-    said = io.StringIO()
-    with contextlib.redirect_stdout(said):
+    with contextlib.redirect_stdout(io.StringIO()):
         assert main(gather_command(PLAN, place / "raw", place / "study")) == 0
-    return mjchair.read_study(place / "study").runs[0].trial, said.getvalue()
+    log = (place / "study" / "gather.log").read_text()
+    return mjchair.read_study(place / "study").runs[0].trial, log
 
 
 @pytest.fixture
@@ -82,8 +82,8 @@ def test_wheels_come_back_with_their_signs_speed_and_torque(made, gathered):
 def test_clocks_and_the_persons_motion_come_back(made, gathered):
     place, runs = made
     found = clocks(gathered[1])
-    assert found["right"]["push1"] == pytest.approx(LATE["right"], abs=0.003)
-    assert found["markers"]["push1"] == pytest.approx(LATE["markers"], abs=0.005)
+    assert found["right"]["push1"] == pytest.approx(LATE["right"], abs=0.0003)
+    assert found["markers"]["push1"] == pytest.approx(LATE["markers"], abs=0.0008)
     # segments of Winter seen as those of de Leva: not quite the displacement that truly was
     assert 0.85 < moved_share(place / "study", place / "truth", runs) < 1.05
 
@@ -117,8 +117,8 @@ def test_a_coast_that_never_stops_has_one_clock(rims):
     raw, _ = rims(pushes=0, coasts=1)
     (trial,) = gather(raw, Known(mass=90.0)).trials
     found = trial.alignments["coast1_right.csv"]
-    assert found.how == "equal speed as it slows"
-    assert abs(found.offset - LATE["right"]) < 0.01 < found.offset_std < 0.1
+    assert found.how == "course of the run"
+    assert abs(found.offset - LATE["right"]) < 4.0 * found.offset_std < 0.01
 
 
 def test_equal_speed_tells_a_clock_only_where_a_chair_slows_alike():

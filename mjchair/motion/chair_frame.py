@@ -18,6 +18,7 @@ from scipy.signal import savgol_filter
 
 from mjchair.errors import MjchairError
 from mjchair.measurement.markers import SMOOTH, Markers
+from mjchair.measurement.notes import Detail
 from mjchair.motion.marker_set import MarkerSet
 
 Array = NDArray[np.float64]
@@ -39,8 +40,8 @@ class InChair:
     Attributes:
       positions: (n, m, 3), m, x forward, y left, z up. speed: (n,), m/s, at which the chair goes
         forward over the laboratory's floor, NaN where it is not seen. heading: (n,), rad, of the
-        direction in which the chair faces, about up, from the laboratory's first level axis (x, or z
-        where y is up), NaN where it is not seen. axes: what up and forward are, in words.
+        direction in which the chair faces, about up, from the laboratory's first level axis (x, or
+        z where y is up), NaN where it is not seen. axes: what up and forward are, in words.
         notes: what was found out, one line each.
     """
 
@@ -97,9 +98,10 @@ def in_chair(markers: Markers, chosen: MarkerSet, positions: Array | None = None
     out = np.stack([x, y, turned[..., 2]], axis=2)
     _check_sides(markers, chosen, out)
     axes = f"up is {_axis_text(up)}, forward is {_axis_text(forward)} ({how})"
+    said = Detail(f"{chosen.name}: {axes}")
     ahead = cos[:, None] * forward + sin[:, None] * left
     speed = np.einsum("ij,ij->i", _rate(markers.time, center), ahead)
-    return InChair(out, speed, _in_laboratory(ahead, up), axes, (f"{chosen.name}: {axes}",))
+    return InChair(out, speed, _in_laboratory(ahead, up), axes, (said,))
 
 
 def _in_laboratory(ahead: Array, up: Array) -> Array:

@@ -22,6 +22,7 @@ from mujoco import minimize
 from numpy.typing import NDArray
 
 from mjchair.errors import MjchairError
+from mjchair.measurement.notes import Detail
 from mjchair.model.parameters import ChairParameters
 from mjchair.model.spec import load_spec
 from mjchair.motion.marker_set import MarkerSet
@@ -196,7 +197,7 @@ def _rider(
         lengths[name] = float(f"{shape * ratio:.4f}")
     said = ", ".join(f"{name} {value:.3f} m" for name, value in lengths.items()) or NO_LENGTHS
     origin = "given" if build.stature is not None else "from the arms" if ratios else "assumed"
-    notes = [f"lengths: {said}; stature {stature:.2f} m ({origin})"]
+    notes: list[str] = [Detail(f"lengths: {said}; stature {stature:.2f} m ({origin})")]
     return Rider(stature=stature, lengths=lengths), notes
 
 

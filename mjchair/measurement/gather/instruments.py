@@ -19,6 +19,7 @@ from mjchair.measurement import baseline as baselines
 from mjchair.measurement import imu, smartwheel
 from mjchair.measurement.exports import read_export
 from mjchair.measurement.gather.sources import Source
+from mjchair.measurement.notes import Detail, about
 from mjchair.measurement.smartwheel import Orientation, PushRim
 from mjchair.rider.anatomy import JOINT_NAMES
 from mjchair.simulation.table import Table, read_table
@@ -106,9 +107,10 @@ def _rider(source: Source, table: Table, notes: Sequence[str] = ()) -> Instrumen
     ground = columns.pop(CHAIR_SPEED, None)
     facing = columns.pop(CHAIR_HEADING, None)
     name = source.path.name
-    said = [f"{name}: {note}" for note in notes]
+    said = [about(name, note) for note in notes]
     told = sum(column in JOINT_NAMES for column in columns)
-    said.append(f"{name}: motion of the rider, {told} of {len(JOINT_NAMES)} joints told")
+    of = f"motion of the rider, {told} of {len(JOINT_NAMES)} joints told"
+    said.append(Detail(f"{name}: {of}"))
     speed = None
     if ground is not None:
         there = np.isfinite(ground)
@@ -216,22 +218,21 @@ def _wheel(
     free = baselines.hands_off(run)
     clean = smartwheel.turned(baselines.take_off(run, base), signs)
     name = source.path.name
-    notes = [
-        *run.notes,
-        f"{name}: {side} wheel; {_signs_text(signs)}" + (f"; {why}" if why else ""),
-    ]
+    wheel = f"{name}: {side} wheel; {_signs_text(signs)}"
+    notes = [*run.notes, f"{wheel}; {why}" if why else Detail(wheel)]
     size = float(np.hypot(base.cosine[:2], base.sine[:2]).max())
-    notes.append(
+    taken = (
         f"{name}: offset {base.offset[5]:+.2f} N m and rim's weight {size:.1f} N once a turn taken "
         f"off by {base.how}; {base.left[5]:.2f} N m is left"
     )
+    notes.append(Detail(taken))
     if clean.angle[-1] - clean.angle[0] < -smartwheel.ROLLS:
         notes.append(f"{name}: rolls backwards on balance")
     rolling = np.abs(clean.speed) > 0.3
     torque = {f"{side}_wheel": clean.torque}
     if rolling.any() and free[rolling].mean() > COAST:
         torque = {}
-        notes.append(f"{name}: no hand on the rim; a coast, its torque is left out")
+        notes.append(Detail(f"{name}: no hand on the rim; a coast, its torque is left out"))
     return Instrument(
         name=name,
         source=source,
@@ -286,7 +287,8 @@ def _imu(source: Source) -> Instrument:
         notes += said_of_it
         speed = gyroscope @ axis
         tilt = ", ".join(f"{a:+.2f}" for a in axis)
-        notes.append(f"{name}: on the {side} wheel; its axle is ({tilt}) of the sensor's axes")
+        sits = f"{name}: on the {side} wheel; its axle is ({tilt}) of the sensor's axes"
+        notes.append(Detail(sits))
         return Instrument(
             name, source, export.time, {f"{side}_wheel_speed": speed}, {}, speed, side,
             trigger=export.trigger, notes=tuple(notes),

@@ -19,6 +19,7 @@ from mjchair.measurement.clocks import Alignment, Signal
 from mjchair.measurement.course import by_course
 from mjchair.measurement.gather.instruments import RADIUS, Instrument, shifted
 from mjchair.measurement.markers import SMOOTH
+from mjchair.measurement.notes import Detail
 from mjchair.simulation.table import SAME, Table, merged
 
 Array = NDArray[np.float64]
@@ -80,7 +81,7 @@ def join(
             continue
         found = (agreed or {}).get(other.name) or _align(ours, other)
         alignments[other.name] = found
-        said = f"{name}: clock of {other.name} on that of {reference.name}: {found.text()}"
+        said = Detail(f"{name}: clock of {other.name} on that of {reference.name}: {found.text()}")
         ours.append(shifted(other, found.to_reference(other.time), (said,)))
         notes += [*other.notes, said]
     ours, told = _frames(ours)
@@ -139,11 +140,11 @@ def _by_motion(ours: Sequence[Instrument], other: Instrument) -> Alignment:
         )
     if other.speed is not None:
         one, two = _of_wheels(ours, other)
-        driven = any(w.torque for w in (*ours, other))
-        if driven or clocks.best_alignment(one, two).clear:
-            return clocks.align(one, two, names)
-        slowing = clocks.align_slowing(one, _in_unit_of(reference, other, two))
-        return slowing or clocks.align(one, two, names)
+        found = clocks.best_alignment(one, two)
+        if found.clear:
+            return found
+        two = _in_unit_of(reference, other, _course(other))
+        return clocks.align_slowing(_course(reference), two) or clocks.align(one, two, names)
     if other.accelerometer is None:
         raise MjchairError(
             f"the clocks of {names[0]} and {names[1]} cannot be aligned: {names[1]} shows no "
@@ -285,10 +286,8 @@ def _frame(one: Instrument, ours: Sequence[Instrument]) -> tuple[Instrument, lis
     rows = [
         f"{a} ({', '.join(f'{v:+.2f}' for v in r)})" for a, r in zip("xyz", sits.axes, strict=True)
     ]
-    notes.append(
-        f"{one.name}: on the frame; forward is {how}; the chair's axes in its own: "
-        + "; ".join(rows)
-    )
+    place = f"{one.name}: on the frame; forward is {how}; the chair's axes in its own: "
+    notes.append(Detail(place + "; ".join(rows)))
     channels = dict(one.channels)
     for i, axis in enumerate("xyz"):
         channels[f"imu_gyro.{axis}"] = gyroscope @ sits.axes[i]
@@ -320,7 +319,8 @@ def _check_sides(name: str, ours: Sequence[Instrument]) -> list[str]:
         )
     if match < 0.5:
         return [f"{name}: the gyroscope does not tell the sides of the wheels ({match:.2f})"]
-    return [f"{name}: the gyroscope confirms the sides of the wheels (correlation {match:.2f})"]
+    said = f"{name}: the gyroscope confirms the sides of the wheels (correlation {match:.2f})"
+    return [Detail(said)]
 
 
 def _span(ours: Sequence[Instrument]) -> tuple[float, float]:

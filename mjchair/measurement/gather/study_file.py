@@ -17,8 +17,8 @@ LOOSE = 0.3  # relative standard deviation of a mass that nobody has weighed
 ENOUGH = 3  # trials of one manoeuvre, from which on one is kept for the final check
 COLUMN = 44  # where comments begin
 HEADINGS = (
-    "Headings are in the laboratory's axes: z up, x the axis nearest to where the chair faces as the "
-    "first run begins"
+    "Headings are in the laboratory's axes: z up, x the axis nearest to where the chair faces as "
+    "the first trial begins"
 )
 
 
@@ -152,6 +152,6 @@ def _trial(trial: GatheredTrial, held_out: bool) -> list[str]:
         out.append(f"# clock of {name}: {found.text()}")
     if trial.heading is not None:
         out.append("[trial.initial]")
-        way = "rad, where the chair faces at first, by markers"
+        way = "rad, where the chair faces at first, not where it goes; by markers"
         out.append(_line(f"heading = {trial.heading:.4f}", way))
     return out

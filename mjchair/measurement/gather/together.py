@@ -54,8 +54,8 @@ def started_together(trials: Sequence[GatheredTrial]) -> tuple[Agreed, tuple[str
                 "uncertainties are too small: each keeps its own"
             )
             continue
-        how = f"mean of {len(names)} recordings, started together"
         for name, file, found in found_ones:
+            how = f"mean of {len(names)} recordings, started together; alone {found.short()}"
             same = replace(found, offset=mean, offset_std=spread, how=how)
             agreed.setdefault(name, {})[file] = same
         notes.append(
