@@ -81,8 +81,8 @@ def run(args: argparse.Namespace) -> int:
     for question in gathered.asked:
         print(f"not known: {question}", file=sys.stderr)
     print(
-        f"wrote {args.out}/study.toml, {len(gathered.trials)} trials; look at {args.out}/{PICTURE}, "
-        f"details are in {args.out}/{LOG}"
+        f"wrote {args.out}/study.toml, {len(gathered.trials)} trials; look at "
+        f"{args.out}/{PICTURE}, details are in {args.out}/{LOG}"
     )
     print(f"next: mjchair diagnose {args.out}")
     return 0
