@@ -221,7 +221,7 @@ def test_the_terminal_has_a_line_or_two_a_trial(made, tmp_path, capsys):
     assert lines[-1] == f"next: mjchair diagnose {tmp_path / 'study'}"
     assert len(lines) < 7
     log = (tmp_path / "study" / "gather.log").read_text()
-    assert "the encoder wraps at 4095" in log and "plug_in_gait: up is +y" in log
+    assert "rim's weight 6.0 N once a turn taken off" in log and "plug_in_gait: up is +y" in log
 
 
 def test_noise_is_at_least_a_step_of_the_encoder(tmp_path):
