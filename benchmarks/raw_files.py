@@ -304,7 +304,7 @@ def _mjchair(*arguments: str) -> tuple[str, float]:
 
 
 def clocks(said: str) -> dict[str, dict[str, float]]:
-    """Offsets (s) that gather printed: instrument of LATE -> trial -> against the left rim."""
+    """Offsets (s) of gather.log: instrument of LATE -> trial -> against the left rim."""
     out: dict[str, dict[str, float]] = {"right": {}, "markers": {}}
     for name, offset in re.findall(
         r"clock of (\S+) on that of \S+_left\.csv: offset (\S+) s", said
@@ -342,7 +342,7 @@ def clock_rows(said: str, every: Sequence[Run]) -> list[tuple[str, str, str]]:
         for word, mine in (("pushes", pushed), ("coasts", trials.keys() - pushed)):
             found = [offset for trial, offset in trials.items() if trial in mine]
             if found:
-                span = f"{min(found):.4f} to {max(found):.4f}"
+                span = f"{min(found):.5f} to {max(found):.5f}"
                 rows.append((f"clock of {instrument}, {word} (s)", f"{LATE[instrument]:g}", span))
     return rows
 
@@ -407,7 +407,8 @@ def main(given: Sequence[str] | None = None) -> None:
     raw, study, truth = (args.out / name for name in ("raw", "study", "truth"))
     every = write(plan, raw, truth, args.seed)
     print(f"hidden: {hidden}; {plan.person}; clocks, s: {LATE}; kept in {truth}")
-    said, used = _mjchair(*gather_command(plan, raw, study))
+    _, used = _mjchair(*gather_command(plan, raw, study))
+    said = (study / "gather.log").read_text(encoding="utf-8")
     share = moved_share(study, truth, every)
     rows = [
         *clock_rows(said, every),

@@ -295,9 +295,12 @@ def test_the_recording_that_ships_is_gathered_by_one_command(tmp_path, capsys):
     out = tmp_path / "study"
     assert main(["gather", str(source), "--out", str(out), "--mass", "92"]) == 0
     said = capsys.readouterr()
-    assert "N once a turn taken off by baseline baseline.csv" in said.out
+    assert "N once a turn taken off by baseline baseline.csv" in (out / "gather.log").read_text()
+    assert len(said.out.splitlines()) < 8
+    assert f"next: mjchair diagnose {out}" in said.out
     assert "--floor" in said.err
-    assert sorted(p.name for p in out.iterdir()) == ["gathered.png", "propulsion.csv", "study.toml"]
+    files = ["gather.log", "gathered.png", "propulsion.csv", "study.toml"]
+    assert sorted(p.name for p in out.iterdir()) == files
 
 
 BAD = {

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from mjchair.simulation.table import Table
 
 PICTURE = "gathered.png"
+DOUBTED = 0.03  # m rms, beyond which a marker is not where the set has it
 
 
 def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -61,8 +62,9 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 
 def run(args: argparse.Namespace) -> int:
     """Gather, check that the study can be read, write it whole, and print what was found out."""
-    from mjchair.measurement.gather.gather import gather
+    from mjchair.measurement.gather.gather import LOG, gather
     from mjchair.measurement.gather.known import Known
+    from mjchair.measurement.notes import Detail, once
     from mjchair.storage import check_vacant
 
     check_vacant(args.out, args.force)
@@ -73,13 +75,16 @@ def run(args: argparse.Namespace) -> int:
     offsets = dict(map(_offset, args.offset))
     gathered = gather(Path(args.folder), known, mappings, offsets, _of_markers(known))
     _write(gathered, Path(args.out), args.force)
-    for note in (*gathered.notes, *gathered.unused):
-        print(note)
+    remarks = (note for note in gathered.notes if not isinstance(note, Detail))
+    for line in (*gathered.summary, *once(remarks), *gathered.unused):
+        print(line)
     for question in gathered.asked:
         print(f"not known: {question}", file=sys.stderr)
     print(
-        f"wrote {args.out}/study.toml, {len(gathered.trials)} trials; look at {args.out}/{PICTURE}"
+        f"wrote {args.out}/study.toml, {len(gathered.trials)} trials; look at "
+        f"{args.out}/{PICTURE}, details are in {args.out}/{LOG}"
     )
+    print(f"next: mjchair diagnose {args.out}")
     return 0
 
 
@@ -91,6 +96,7 @@ def _of_markers(known: Known) -> ReadsMarkers:
     first: list[tuple[Path, Mapping[str, float]]] = []
 
     def read(path: Path, still: Path | None) -> tuple[Table, list[str]]:
+        from mjchair.measurement.notes import Detail
         from mjchair.motion.capture import captured, table_columns, unlike
         from mjchair.motion.inverse_kinematics import Build
         from mjchair.simulation.table import Table
@@ -108,10 +114,8 @@ def _of_markers(known: Known) -> ReadsMarkers:
             )
         off = {name: f"{1e3 * value:.0f}" for name, value in motion.residuals.items()}
         worst = max(motion.residuals, key=lambda name: motion.residuals[name])
-        notes = [
-            *motion.notes,
-            f"marker residuals up to {off[worst]} mm rms ({worst})",
-        ]
+        said = f"marker residuals up to {off[worst]} mm rms ({worst})"
+        notes = [*motion.notes, said if motion.residuals[worst] > DOUBTED else Detail(said)]
         return Table(motion.time, table_columns(motion), str(path)), notes
 
     return read

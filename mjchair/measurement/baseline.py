@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_erosion
+from scipy.ndimage import binary_erosion, binary_opening
 
 from mjchair.errors import MjchairError
 from mjchair.measurement.smartwheel import RATE, PushRim
@@ -28,6 +28,7 @@ PASSED = 9
 NOISE = np.array([1.0, 1.0, 1.0, 0.15, 0.15, 0.15])  # N and N m, least spread of a free rim
 START = 0.4  # share of the samples, nearest to the median of Mz, that a search starts from
 ROUNDS = 30
+HOLDS = 3  # samples, less than which no hand holds a rim: one reading of noise is no hand
 SURE = 0.04  # s, by which contact is taken to last longer at both ends than it shows
 HANDS_OFF = 0.5  # s of free rolling, the least that an offset is read from
 
@@ -110,7 +111,8 @@ def hands_off(run: PushRim) -> NDArray[np.bool_]:
         base = _fit(run, free, "")
         off = np.abs(run.forces - base.at(run.absolute))
         limit = 3.0 * np.maximum(1.4826 * np.median(off[free], axis=0), NOISE)
-        new = np.asarray((off < limit).all(axis=1))
+        touched = binary_opening((off >= limit).any(axis=1), np.ones(HOLDS))
+        new = np.asarray(~touched)
         new = binary_erosion(new, np.ones(2 * round(SURE * RATE) + 1), border_value=1)
         if new.sum() < HANDS_OFF * RATE or (new == free).all():
             break

@@ -13,6 +13,10 @@ that near. Drift is the slope of offsets of parts of the recording.
 
 A coast that never stops is a straight line and has no such lag. Two instruments that read one speed
 are put where they read the same (`align_slowing`); that is as sure as their speeds are equal.
+
+A coast that stops has a lag, but a poor one: without constant and slope only the bend at its end is
+left, a hump so wide that its correlation is flat over 10 ms. Where two instruments tell one course,
+`mjchair.measurement.course` begins here and goes on to a tenth of a millisecond.
 """
 
 from __future__ import annotations
@@ -86,8 +90,11 @@ class Alignment:
         if np.isfinite(self.drift_std):
             drift = f", drift {1e6 * self.drift:.0f} +- {1e6 * self.drift_std:.0f} ppm"
         match = f", correlation {self.correlation:.2f}" if np.isfinite(self.correlation) else ""
-        spread = 1e3 * self.offset_std
-        return f"offset {self.offset:+.4f} s +- {spread:.1f} ms{drift} ({self.how}{match})"
+        return f"offset {self.short()}{drift} ({self.how}{match})"
+
+    def short(self) -> str:
+        """The offset with its uncertainty alone."""
+        return f"{self.offset:+.5f} s +- {1e3 * self.offset_std:.2g} ms"
 
 
 def align(reference: Signal, other: Signal, names: tuple[str, str] = ("one", "two")) -> Alignment:

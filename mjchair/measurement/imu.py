@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.errors import MjchairError
+from mjchair.measurement.notes import Detail
 
 Array = NDArray[np.float64]
 
@@ -61,9 +62,8 @@ def without_offset(
     offset = np.median(gyroscope[rest], axis=0)
     text = ", ".join(f"{value:+.4f}" for value in offset)
     lasts = rest.sum() * float(np.median(np.diff(time)))
-    return gyroscope - offset, [
-        f"{name}: gyroscope offset {text} rad/s taken off, from {lasts:.1f} s at rest"
-    ]
+    said = f"gyroscope offset {text} rad/s taken off, from {lasts:.1f} s at rest"
+    return gyroscope - offset, [Detail(f"{name}: {said}")]
 
 
 def in_si(accelerometer: Array, source: str) -> tuple[Array, str]:
@@ -74,7 +74,8 @@ def in_si(accelerometer: Array, source: str) -> tuple[Array, str]:
     """
     size = float(np.median(np.linalg.norm(accelerometer, axis=1)))
     if LEVEL[0] < size < LEVEL[1]:
-        return accelerometer * GRAVITY, f"{source}: its accelerometer shows 1 at rest; it is in g"
+        said = f"{source}: its accelerometer shows 1 at rest; it is in g"
+        return accelerometer * GRAVITY, Detail(said)
     if not LEVEL[0] * GRAVITY < size < LEVEL[1] * GRAVITY:
         raise MjchairError(
             f"{source}: its accelerometer shows {size:.2f} m/s^2 at rest, and gravity is 9.81; "

@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 UNITS = {"m": 1.0, "meter": 1.0, "meters": 1.0, "cm": 1e-2, "mm": 1e-3, "millimeters": 1e-3}
 SPREAD = (0.15, 6.0)  # m, between the markers of a person in a chair at one time
+SMOOTH = 0.08  # s, half width of the parabolas through a chair's way that give its speed
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from scipy.signal import savgol_filter
 from mjchair.errors import MjchairError
 from mjchair.measurement import encoder
 from mjchair.measurement.delimited import read_delimited
+from mjchair.measurement.notes import Detail, about
 from mjchair.measurement.trial import Trial
 from mjchair.simulation.inputs import Inputs
 from mjchair.simulation.table import frozen
@@ -114,7 +115,7 @@ def read_smartwheel(path: str | os.PathLike[str]) -> PushRim:
         ground_speed=frozen(data[:, 4]),
         there=there,
         source=str(path),
-        notes=tuple(f"{path.name}: {note}" for note in notes),
+        notes=tuple(about(path.name, note) for note in notes),
     )
 
 
@@ -170,9 +171,10 @@ def _angle(data: Array) -> tuple[Array, list[str]]:
     ticks = encoder.unwrapped(data[:, 2] * (2.0 * np.pi / TICKS))
     degrees = encoder.unwrapped(np.radians(data[:, 3]))
     apart = np.abs((np.degrees(ticks - degrees) + 180.0) % 360.0 - 180.0)
-    notes = []
+    notes: list[str] = []
     if np.ptp(data[:, 2]) < TICKS and np.ptp(ticks) > 2.0 * np.pi:
-        notes.append(f"the encoder wraps at {TICKS - 1}; it is counted on, {ticks_text(ticks)}")
+        wraps = f"the encoder wraps at {TICKS - 1}; it is counted on, {ticks_text(ticks)}"
+        notes.append(Detail(wraps))
     if np.median(apart) < DEGREES:
         return degrees, notes
     if np.ptp(data[:, 3]) > 0.0:

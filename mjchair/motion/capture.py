@@ -1,8 +1,9 @@
 """All steps from motion capture to a table of the rider's joints.
 
 In: a file of markers, perhaps a static trial, a marker set, and whose body it is. Out: a `Motion`,
-and its table as text: `time`, the joints that markers tell (rad), `rider_motion` (m), and
-`chair_speed` (m/s, over the floor, by which other clocks find this one).
+and its table as text: `time`, the joints that markers tell (rad), `rider_motion` (m),
+`chair_speed` (m/s, over the floor, by which other clocks find this one), and `chair_heading` (rad,
+in the laboratory).
 """
 
 from __future__ import annotations
@@ -67,7 +68,8 @@ def _captured(
     if rest is not None:
         _check_person(placed.positions, rest, markers, chosen, str(static))
     motion = fit(markers.time, placed.positions, markers.names, chosen, build, rest, say)
-    return replace(motion, notes=(*placed.notes, *motion.notes), speed=placed.speed)
+    notes = (*placed.notes, *motion.notes)
+    return replace(motion, notes=notes, speed=placed.speed, heading=placed.heading)
 
 
 def _static(still: Markers, run: Markers, chosen: MarkerSet) -> np.ndarray:
@@ -105,6 +107,8 @@ def table_columns(motion: Motion) -> dict[str, np.ndarray]:
     columns = {**motion.angles, "rider_motion": motion.center}
     if motion.speed is not None:
         columns["chair_speed"] = motion.speed
+    if motion.heading is not None:
+        columns["chair_heading"] = motion.heading
     return {n: v for n, v in columns.items() if np.isfinite(v).any()}
 
 

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from mjchair.errors import MjchairError
-from mjchair.measurement.markers import Markers
+from mjchair.measurement.markers import SMOOTH, Markers
+from mjchair.measurement.notes import Detail
 from mjchair.motion.marker_set import MarkerSet
 
 Array = NDArray[np.float64]
@@ -27,7 +28,6 @@ HIGH_SEGMENTS = {"head", "trunk"}
 TRAVELS = 1.0  # m, of a chair's way from which forward is told
 RIGID = 0.03  # m, by which the distance of two markers of a chair may change
 SHORT = 0.2  # s, of a gap that is bridged
-SMOOTH = 0.08  # s, half width of the parabolas through the chair's way
 ABOVE = 0.99  # share of all samples that must lie above the floor
 LEAST = 0.05  # m, by which head and shoulders must lie above the chair
 SURE = 0.05  # m, by which left must lie left of right to tell which is which
@@ -39,12 +39,15 @@ class InChair:
 
     Attributes:
       positions: (n, m, 3), m, x forward, y left, z up. speed: (n,), m/s, at which the chair goes
-        forward over the laboratory's floor, NaN where it is not seen. axes: what up and forward
-        are, in words. notes: what was found out, one line each.
+        forward over the laboratory's floor, NaN where it is not seen. heading: (n,), rad, of the
+        direction in which the chair faces, about up, from the laboratory's first level axis (x, or
+        z where y is up), NaN where it is not seen. axes: what up and forward are, in words.
+        notes: what was found out, one line each.
     """
 
     positions: Array
     speed: Array
+    heading: Array
     axes: str
     notes: tuple[str, ...]
 
@@ -95,9 +98,22 @@ def in_chair(markers: Markers, chosen: MarkerSet, positions: Array | None = None
     out = np.stack([x, y, turned[..., 2]], axis=2)
     _check_sides(markers, chosen, out)
     axes = f"up is {_axis_text(up)}, forward is {_axis_text(forward)} ({how})"
+    said = Detail(f"{chosen.name}: {axes}")
     ahead = cos[:, None] * forward + sin[:, None] * left
     speed = np.einsum("ij,ij->i", _rate(markers.time, center), ahead)
-    return InChair(out, speed, axes, (f"{chosen.name}: {axes}",))
+    return InChair(out, speed, _in_laboratory(ahead, up), axes, (said,))
+
+
+def _in_laboratory(ahead: Array, up: Array) -> Array:
+    """Angle (n,) about up, rad, of level directions (n, 3).
+
+    The laboratory's axes, taken on in their order from the one that points up, are the first and
+    second level axes: x and y for z, z and x for y, y and z for x.
+    """
+    main = int(np.argmax(np.abs(up)))
+    first = np.eye(3)[(main + 1) % 3]
+    first = first - up * (up @ first)
+    return np.asarray(np.arctan2(ahead @ np.cross(up, first), ahead @ first))
 
 
 def _rate(time: Array, center: Array) -> Array:
@@ -222,13 +238,18 @@ def _forward(
     up, way = known
     if chosen.forward:
         return _axis(chosen.forward), "said"
-    if np.linalg.norm(way) > TRAVELS:
-        return _level(way, up), "the way it goes"
+    front = None
     if chosen.front and chosen.rear:
         ahead = _middle(markers, list(chosen.front), positions) - _middle(
             markers, list(chosen.rear), positions
         )
-        return _snapped(np.nanmedian(ahead, axis=0), up), "from its rear to its front"
+        front = np.nanmedian(ahead, axis=0) if np.isfinite(ahead).any() else None
+    if np.linalg.norm(way) > TRAVELS:
+        if front is not None and front @ way < 0.0:
+            return _level(-way, up), "against the way it goes: its front is behind, it rolls back"
+        return _level(way, up), "the way it goes"
+    if front is not None:
+        return _snapped(front, up), "from its rear to its front"
     across = _left(markers, chosen, positions)
     if across is None:
         raise MjchairError(

@@ -22,6 +22,7 @@ from mujoco import minimize
 from numpy.typing import NDArray
 
 from mjchair.errors import MjchairError
+from mjchair.measurement.notes import Detail
 from mjchair.model.parameters import ChairParameters
 from mjchair.model.spec import load_spec
 from mjchair.motion.marker_set import MarkerSet
@@ -63,6 +64,7 @@ class Motion:
         chair frame. names: of the markers. qpos: (n, joints), rad, with the joints that no marker
         tells at the chair's posture. notes: one line each. model: of the rider in the chair.
         speed: (n,), m/s, of the chair over the floor, NaN where it was not seen; None: not told.
+        heading: (n,), rad, in the laboratory, as in `chair_frame`; the same.
     """
 
     time: Array
@@ -76,6 +78,7 @@ class Motion:
     notes: tuple[str, ...]
     model: mujoco.MjModel
     speed: Array | None = None
+    heading: Array | None = None
 
 
 @dataclass
@@ -194,7 +197,7 @@ def _rider(
         lengths[name] = float(f"{shape * ratio:.4f}")
     said = ", ".join(f"{name} {value:.3f} m" for name, value in lengths.items()) or NO_LENGTHS
     origin = "given" if build.stature is not None else "from the arms" if ratios else "assumed"
-    notes = [f"lengths: {said}; stature {stature:.2f} m ({origin})"]
+    notes: list[str] = [Detail(f"lengths: {said}; stature {stature:.2f} m ({origin})")]
     return Rider(stature=stature, lengths=lengths), notes
 
 

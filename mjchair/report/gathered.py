@@ -1,7 +1,8 @@
 """The picture of a gathered study: the readings of all instruments for one motion, on one clock.
 
 In: the trials. Out: a figure with a row for each trial, those with a torque first: wheel speeds on
-the left; torque, turning rate or what the wheels' sensors show on the right.
+the left; torque, turning rate or what the wheels' sensors show on the right. Where markers show how
+the rider moves, one more row has that of all these trials.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from mjchair.report.figure import Figure
 Array = NDArray[np.float64]
 
 MOST = 6  # trials that are drawn
+RIDER = "rider_motion"  # m, a column
 ROW = 2.6  # inches a trial
 STYLES = ("-", "--", ":", "-.")
 
@@ -28,18 +30,41 @@ STYLES = ("-", "--", ":", "-.")
 def gathered_figure(trials: Sequence[GatheredTrial]) -> Figure:
     """Wheel speeds of all instruments, the torque after its baseline, and turning rates."""
     shown = sorted(_different(trials), key=lambda trial: not trial.driven)[:MOST]
-    figure = Figure(figsize=(12.0, ROW * len(shown) + 0.9), layout="constrained")
-    axes = figure.subplots(len(shown), 2, squeeze=False)
-    for trial, (left, right) in zip(shown, axes, strict=True):
+    moving = [trial for trial in shown if RIDER in trial.columns]
+    rows = len(shown) + bool(moving)
+    figure = Figure(figsize=(12.0, ROW * rows + 0.9), layout="constrained")
+    grid = figure.add_gridspec(rows, 2)
+    for row, trial in enumerate(shown):
+        left, right = (figure.add_subplot(grid[row, column]) for column in range(2))
         _speeds(left, trial)
         _second(right, trial)
         for one in (left, right):
             one.grid(alpha=0.3)
             one.set_xlabel("time (s)")
+    if moving:
+        _rider(figure.add_subplot(grid[-1, :]), moving)
     more = len(_different(trials)) - len(shown)
     text = "What the instruments say of one motion, on one clock"
     figure.suptitle(text + (f" (first {MOST} trials; {more} more)" if more else ""))
     return figure
+
+
+def _rider(axes: Axes, trials: Sequence[GatheredTrial]) -> None:
+    """How far the rider's centre of mass is forward, mm."""
+    for number, trial in enumerate(trials):
+        there = np.isfinite(trial.columns[RIDER])
+        axes.plot(
+            trial.time[there], 1e3 * trial.columns[RIDER][there], STYLES[number // len(SERIES)],
+            lw=1.0, color=SERIES[number % len(SERIES)], label=trial.name,
+        )  # fmt: skip
+    axes.set_title(
+        "rider's centre of mass, forward of its mean", fontsize=8, loc="left", color=NOTE
+    )
+    axes.set_ylabel("rider_motion (mm)")
+    axes.set_xlabel("time (s)")
+    axes.grid(alpha=0.3)
+    axes.set_xlim(0.0, max(float(trial.time[-1]) for trial in trials))
+    axes.legend(fontsize=7, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=MOST, frameon=False)
 
 
 def _different(trials: Sequence[GatheredTrial]) -> list[GatheredTrial]:
@@ -68,7 +93,7 @@ def _speeds(axes: Axes, trial: GatheredTrial) -> None:
             color=_colour(one, number), label=f"{side}{one.name}",
         )  # fmt: skip
     _forward(axes, trial)
-    lines = [f"{name}: {found.text()}" for name, found in trial.alignments.items()]
+    lines = [f"clock of {name}: {found.short()}" for name, found in trial.alignments.items()]
     axes.set_title("\n".join([trial.name, *lines]), fontsize=8, loc="left", color=NOTE)
     axes.set_ylabel("wheel speed (rad/s)")
     axes.set_xlim(0.0, float(np.ptp(trial.instruments[0].time)))

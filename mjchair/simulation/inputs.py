@@ -318,6 +318,6 @@ def as_inputs(
 
 
 # Columns of a measured run that are neither an actuator nor a sensor: forward displacement of the
-# rider's centre of mass in the chair frame (m), and speed of the chair as measured by markers
-# (m/s).
-OTHER_COLUMNS = frozenset({"rider_motion", "chair_speed"})
+# rider's centre of mass in the chair frame (m), speed (m/s) and heading in the laboratory (rad) of
+# the chair as measured by markers.
+OTHER_COLUMNS = frozenset({"rider_motion", "chair_speed", "chair_heading"})

@@ -20,17 +20,20 @@ from mjchair.measurement.gather.instruments import (
     ReadsMarkers,
     read_instruments,
 )
-from mjchair.measurement.gather.join import GatheredTrial, join
+from mjchair.measurement.gather.join import GatheredTrial, heading_at, join
 from mjchair.measurement.gather.known import Known
 from mjchair.measurement.gather.sources import Source, find_sources
 from mjchair.measurement.gather.study_file import study_text
+from mjchair.measurement.gather.together import Agreed, label_of, started_together
 from mjchair.measurement.gather.without_torque import estimated
 
 Array = NDArray[np.float64]
 
+LOG = "gather.log"
 QUIET = 0.5  # s at rest, the least from which noise is read
 RESTS = 0.05  # rad/s of a wheel, below which the chair stands
 STEP = 2.0 * np.pi / 4096  # rad, of the encoders in use
+EVEN, FEW = 0.2, 6.4  # of a step, within which readings come in whole steps, of so many at most
 RUNS_OFF_FLOOR = ("rollers",)  # floors on which the chair itself does not move
 
 
@@ -40,8 +43,9 @@ class Gathered:
 
     Attributes:
       files: name -> text, of the study folder. trials: as they stand in it. noise: channel ->
-        standard deviation at rest, SI. notes: what was found out. unused: files, and why.
-      asked: what cannot be known from the files, with its flag.
+        standard deviation at rest, SI. notes: what was found out, of which a `Detail` stands in
+        the file gather.log alone. unused: files, and why. asked: what cannot be known from the
+        files, with its flag. summary: a line or two for each trial.
     """
 
     files: Mapping[str, str]
@@ -50,6 +54,7 @@ class Gathered:
     notes: tuple[str, ...]
     unused: tuple[str, ...]
     asked: tuple[str, ...]
+    summary: tuple[str, ...] = ()
 
 
 def gather(
@@ -79,13 +84,18 @@ def gather(
         raise MjchairError(
             f"{folder}: no wheel, no sensor on the frame and no markers among its files"
         )
-    trials = []
-    for name in names:
-        trial = join(name, [one for one in instruments if one.source.trial == name])
-        trials += _usable(_for_floor(trial, known), known)
+    mine = {name: [one for one in instruments if one.source.trial == name] for name in names}
+    joined = [join(name, mine[name]) for name in names]
+    agreed, shared = started_together(joined)
+    trials: list[GatheredTrial] = []
+    for name, trial in zip(names, joined, strict=True):
+        same = join(name, mine[name], agreed[name]) if name in agreed else trial
+        trials += _usable(_for_floor(same, known), known)
     if not trials:
         raise MjchairError(f"{folder}: no trial with a motion that a study can use")
     _ask_sides(trials)
+    if known.floor not in RUNS_OFF_FLOOR:
+        trials = _headed(trials)
     noise = _noise(trials)
     notes = [*dict.fromkeys(note for trial in trials for note in trial.notes)]
     notes += [
@@ -94,10 +104,31 @@ def gather(
     if of_markers is None:
         notes += [_about_markers(s) for s in sources if s.kind == "markers"]
     radius = next((one.radius for one in instruments if one.radius is not None), None)
-    text = study_text(trials, noise, known, radius)
+    notes += shared
+    text = study_text(trials, noise, known, radius, shared)
     files = {"study.toml": text} | {f"{t.name}.csv": table_text(t) for t in trials}
+    summary = _summary(trials, agreed)
+    files[LOG] = "\n".join((*summary, *notes, *found.unused)) + "\n"
     asked = known.missing(radius)
-    return Gathered(files, tuple(trials), noise, tuple(notes), found.unused, asked)
+    return Gathered(files, tuple(trials), noise, tuple(notes), found.unused, asked, summary)
+
+
+def _summary(trials: Sequence[GatheredTrial], agreed: Agreed) -> tuple[str, ...]:
+    """A line for each trial, and one more on clocks that it does not share with others."""
+    wide = max(len(trial.name) for trial in trials)
+    out = []
+    for trial in trials:
+        what = ", ".join(label_of(one) for one in trial.instruments)
+        lasts = trial.time[-1] - trial.time[0]
+        faces = ""
+        if trial.heading is not None:
+            faces = f"; faces {round(np.degrees(trial.heading))} deg"
+        out.append(f"{trial.name:<{wide}}  {trial.manoeuvre}, {lasts:.1f} s: {what}{faces}")
+        same = agreed.get(trial.name, {})
+        own = [f"{n} {a.short()}" for n, a in trial.alignments.items() if n not in same]
+        if own:
+            out.append(f"{'':<{wide}}  clocks: {', '.join(own)}")
+    return tuple(out)
 
 
 def _ask_sides(trials: Sequence[GatheredTrial]) -> None:
@@ -171,11 +202,35 @@ def _cut(trial: GatheredTrial, name: str, span: tuple[float, float], said: str) 
     )
 
 
+def _headed(trials: Sequence[GatheredTrial]) -> list[GatheredTrial]:
+    """The trials with the heading at which they begin, where markers show it.
+
+    x is the axis of the laboratory that is nearest to where the chair faces as the first trial
+    begins, z is up; headings are from a quarter turn to the right to three quarters to the left.
+    """
+    told = [heading_at(trial.instruments, trial.begin + trial.time[0]) for trial in trials]
+    first = next((angle for angle in told if angle is not None), None)
+    if first is None:
+        return list(trials)
+    quarter = 0.5 * np.pi
+    zero = quarter * round(first / quarter)
+    return [
+        trial
+        if angle is None
+        else replace(trial, heading=float((angle - zero + quarter) % (4.0 * quarter) - quarter))
+        for trial, angle in zip(trials, told, strict=True)
+    ]
+
+
 def _noise(trials: Sequence[GatheredTrial]) -> dict[str, float]:
     """Standard deviation of each channel where the chair stands, the median over trials."""
     seen: dict[str, list[float]] = {}
+    least: dict[str, float] = {}
     for trial in trials:
-        for begin, end in _rests(trial):
+        rests = _rests(trial)
+        for name, values in trial.columns.items() if rests else ():
+            least[name] = max(least.get(name, 0.0), _tick(name, values) / np.sqrt(12.0))
+        for begin, end in rests:
             for name, values in trial.columns.items():
                 if name in ("left_wheel", "right_wheel", *RIDER_COLUMNS):
                     continue
@@ -184,11 +239,27 @@ def _noise(trials: Sequence[GatheredTrial]) -> dict[str, float]:
                     seen.setdefault(name, []).append(_scatter(values[inside]))
     out = {}
     for name, sizes in seen.items():
-        least = STEP / np.sqrt(12.0) if name.endswith("_angle") else 0.0
-        size = max(float(np.median(sizes)), least)
+        size = max(float(np.median(sizes)), least[name])
         if size > 0.0:
-            out[name] = float(f"{size:.2g}")
+            size = float(f"{size:.2g}")
+            out[name] = size if size >= least[name] else float(f"{1.05 * least[name]:.2g}")
     return out
+
+
+def _tick(name: str, values: Array) -> float:
+    """The step in which a channel's readings come; of an angle at least that of encoders in use.
+
+    A channel at rest may repeat one reading; it is known to no better than that. 0: readings come
+    in no step.
+    """
+    usual = STEP if name.endswith("_angle") else 0.0
+    steps = np.abs(np.diff(values[np.isfinite(values)]))
+    steps = steps[steps > 1e-9]
+    if not steps.size:
+        return usual
+    tick = float(steps.min())
+    few = steps[steps < FEW * tick] / tick
+    return max(usual, tick) if np.all(np.abs(few - np.round(few)) < EVEN) else usual
 
 
 def _scatter(values: Array) -> float:

@@ -19,6 +19,7 @@ from mjchair.measurement import baseline as baselines
 from mjchair.measurement import imu, smartwheel
 from mjchair.measurement.exports import read_export
 from mjchair.measurement.gather.sources import Source
+from mjchair.measurement.notes import Detail, about
 from mjchair.measurement.smartwheel import Orientation, PushRim
 from mjchair.rider.anatomy import JOINT_NAMES
 from mjchair.simulation.table import Table, read_table
@@ -29,7 +30,8 @@ OTHER = {"left": "right", "right": "left"}
 COAST = 0.98  # share of a rolling recording without a hand, above which it is a coast
 SMOOTH = 0.1  # s, of the local parabola that turns a table's angle into speed
 CHAIR_SPEED = "chair_speed"  # m/s, a column of a rider's motion
-RIDER_COLUMNS = {*JOINT_NAMES, "rider_motion", CHAIR_SPEED}
+CHAIR_HEADING = "chair_heading"  # rad, in the laboratory, the same
+RIDER_COLUMNS = {*JOINT_NAMES, "rider_motion", CHAIR_SPEED, CHAIR_HEADING}
 RADIUS = 0.3  # m, of a rear wheel where nothing tells it: 24 inches
 SEEN = 0.7  # share of the time below which it is said how little of the chair is seen
 # a file of markers and the static trial beside it -> the table of the rider's motion, and notes
@@ -47,7 +49,8 @@ class Instrument:
       gyroscope, accelerometer: (n, 3) of a sensor on the frame, in its own axes; None.
       trigger: time at which its trigger rises, s; None. free: (n,), without a hand; None.
       radius: of the wheel, m, from the file; None. ground: (n,) m/s, of the chair over the floor,
-        by markers; None. doubted: whether its signs are those of a wheel of the other side.
+        by markers; None. facing: (n,) rad, of its forward axis in the laboratory, the same.
+        doubted: whether its signs are those of a wheel of the other side.
       notes: one line each.
     """
 
@@ -64,6 +67,7 @@ class Instrument:
     free: NDArray[np.bool_] | None = None
     radius: float | None = None
     ground: Array | None = None
+    facing: Array | None = None
     doubted: bool = False
     notes: tuple[str, ...] = ()
 
@@ -101,10 +105,12 @@ def _rider(source: Source, table: Table, notes: Sequence[str] = ()) -> Instrumen
     """The motion of a rider: joints (rad), centre of mass (m), and the chair's speed (m/s)."""
     time, columns = np.asarray(table.time), dict(table.columns)
     ground = columns.pop(CHAIR_SPEED, None)
+    facing = columns.pop(CHAIR_HEADING, None)
     name = source.path.name
-    said = [f"{name}: {note}" for note in notes]
+    said = [about(name, note) for note in notes]
     told = sum(column in JOINT_NAMES for column in columns)
-    said.append(f"{name}: motion of the rider, {told} of {len(JOINT_NAMES)} joints told")
+    of = f"motion of the rider, {told} of {len(JOINT_NAMES)} joints told"
+    said.append(Detail(f"{name}: {of}"))
     speed = None
     if ground is not None:
         there = np.isfinite(ground)
@@ -112,7 +118,9 @@ def _rider(source: Source, table: Table, notes: Sequence[str] = ()) -> Instrumen
             said.append(f"{name}: the chair is seen in {there.mean():.0%} of the time")
         # a wheel of the usual radius; clocks are put together by its course alone
         speed = np.interp(time, time[there], ground[there]) / RADIUS
-    return Instrument(name, source, time, columns, speed=speed, ground=ground, notes=tuple(said))
+    return Instrument(
+        name, source, time, columns, speed=speed, ground=ground, facing=facing, notes=tuple(said)
+    )
 
 
 def _wheels(sources: list[Source]) -> list[Instrument]:
@@ -210,22 +218,21 @@ def _wheel(
     free = baselines.hands_off(run)
     clean = smartwheel.turned(baselines.take_off(run, base), signs)
     name = source.path.name
-    notes = [
-        *run.notes,
-        f"{name}: {side} wheel; {_signs_text(signs)}" + (f"; {why}" if why else ""),
-    ]
+    wheel = f"{name}: {side} wheel; {_signs_text(signs)}"
+    notes = [*run.notes, f"{wheel}; {why}" if why else Detail(wheel)]
     size = float(np.hypot(base.cosine[:2], base.sine[:2]).max())
-    notes.append(
+    taken = (
         f"{name}: offset {base.offset[5]:+.2f} N m and rim's weight {size:.1f} N once a turn taken "
         f"off by {base.how}; {base.left[5]:.2f} N m is left"
     )
+    notes.append(Detail(taken))
     if clean.angle[-1] - clean.angle[0] < -smartwheel.ROLLS:
         notes.append(f"{name}: rolls backwards on balance")
     rolling = np.abs(clean.speed) > 0.3
     torque = {f"{side}_wheel": clean.torque}
     if rolling.any() and free[rolling].mean() > COAST:
         torque = {}
-        notes.append(f"{name}: no hand on the rim; a coast, its torque is left out")
+        notes.append(Detail(f"{name}: no hand on the rim; a coast, its torque is left out"))
     return Instrument(
         name=name,
         source=source,
@@ -280,7 +287,8 @@ def _imu(source: Source) -> Instrument:
         notes += said_of_it
         speed = gyroscope @ axis
         tilt = ", ".join(f"{a:+.2f}" for a in axis)
-        notes.append(f"{name}: on the {side} wheel; its axle is ({tilt}) of the sensor's axes")
+        sits = f"{name}: on the {side} wheel; its axle is ({tilt}) of the sensor's axes"
+        notes.append(Detail(sits))
         return Instrument(
             name, source, export.time, {f"{side}_wheel_speed": speed}, {}, speed, side,
             trigger=export.trigger, notes=tuple(notes),

@@ -11,11 +11,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import savgol_filter
 
 from mjchair.errors import MjchairError
 from mjchair.measurement import clocks, imu
 from mjchair.measurement.clocks import Alignment, Signal
+from mjchair.measurement.course import by_course
 from mjchair.measurement.gather.instruments import RADIUS, Instrument, shifted
+from mjchair.measurement.markers import SMOOTH
+from mjchair.measurement.notes import Detail
 from mjchair.simulation.table import SAME, Table, merged
 
 Array = NDArray[np.float64]
@@ -25,6 +29,9 @@ GAP = 0.2  # s, in which the chair is not seen, beyond which its speed there is 
 ENOUGH = 4.0  # s, of the chair seen without a gap, that tell a clock alone
 RESTS = 0.05  # rad/s of a wheel, below which the chair stands
 TURNS = 0.03  # rad/s rms, of a turning by which sides are checked
+RADII = 0.02  # of a wheel's radius, by which it may be off that which it was set to; assumption
+FREE = 0.1  # the same where nothing tells it
+EARLY = (0.3, 1.0)  # s: a heading at the beginning is a mean over so long, and seen within so long
 
 
 @dataclass(frozen=True)
@@ -35,7 +42,8 @@ class GatheredTrial:
       name: of its table. time: (n,), s, the reference's clock. columns: study column -> (n,).
       manoeuvre: a word. alignments: file -> how its clock was put on the reference.
       instruments: on the reference's clock, for the picture. notes: one line each. begin: the
-        reference's time at time zero of the table, s.
+        reference's time at time zero of the table, s. heading: rad, at the first row, in the axes
+        of all trials; None: nothing tells it.
     """
 
     name: str
@@ -46,6 +54,7 @@ class GatheredTrial:
     instruments: tuple[Instrument, ...] = ()
     notes: tuple[str, ...] = ()
     begin: float = 0.0
+    heading: float | None = None
 
     @property
     def driven(self) -> bool:
@@ -53,8 +62,13 @@ class GatheredTrial:
         return bool({"left_wheel", "right_wheel"} & set(self.columns))
 
 
-def join(name: str, instruments: Sequence[Instrument]) -> GatheredTrial:
+def join(
+    name: str, instruments: Sequence[Instrument], agreed: Mapping[str, Alignment] | None = None
+) -> GatheredTrial:
     """The trial of instruments that measured it.
+
+    Args:
+      agreed: file -> its alignment, where it is known; the others are found.
 
     Raises:
       MjchairError: clocks that cannot be aligned, or nothing that a study can use.
@@ -65,9 +79,9 @@ def join(name: str, instruments: Sequence[Instrument]) -> GatheredTrial:
     for other in sorted(instruments, key=lambda one: one.speed is None):
         if other is chosen:
             continue
-        found = _align(ours, other)
+        found = (agreed or {}).get(other.name) or _align(ours, other)
         alignments[other.name] = found
-        said = f"{name}: clock of {other.name} on that of {reference.name}: {found.text()}"
+        said = Detail(f"{name}: clock of {other.name} on that of {reference.name}: {found.text()}")
         ours.append(shifted(other, found.to_reference(other.time), (said,)))
         notes += [*other.notes, said]
     ours, told = _frames(ours)
@@ -109,6 +123,15 @@ def _align(ours: Sequence[Instrument], other: Instrument) -> Alignment:
         first, second = (float(np.median(np.diff(one.time))) for one in (reference, other))
         spread = float(np.hypot(first, second) / np.sqrt(12.0))
         return Alignment(reference.trigger - other.trigger, spread, how="trigger")
+    found = _by_motion(ours, other)
+    if found.drift != 0.0:
+        return found
+    return _by_course(reference, other, found) or found
+
+
+def _by_motion(ours: Sequence[Instrument], other: Instrument) -> Alignment:
+    """The alignment by the motion that two instruments share."""
+    reference = ours[0]
     names = (reference.name, other.name)
     if reference.speed is None:
         raise MjchairError(
@@ -117,11 +140,11 @@ def _align(ours: Sequence[Instrument], other: Instrument) -> Alignment:
         )
     if other.speed is not None:
         one, two = _of_wheels(ours, other)
-        driven = any(w.torque for w in (*ours, other))
-        if driven or clocks.best_alignment(one, two).clear:
-            return clocks.align(one, two, names)
-        slowing = clocks.align_slowing(one, _in_unit_of(reference, other, two))
-        return slowing or clocks.align(one, two, names)
+        found = clocks.best_alignment(one, two)
+        if found.clear:
+            return found
+        two = _in_unit_of(reference, other, _course(other))
+        return clocks.align_slowing(_course(reference), two) or clocks.align(one, two, names)
     if other.accelerometer is None:
         raise MjchairError(
             f"the clocks of {names[0]} and {names[1]} cannot be aligned: {names[1]} shows no "
@@ -129,6 +152,63 @@ def _align(ours: Sequence[Instrument], other: Instrument) -> Alignment:
         )
     level = (other.accelerometer @ imu.upright(other.accelerometer).T)[:, :2]
     return clocks.align(_gained(ours), Signal(other.time, level), names)
+
+
+def _by_course(reference: Instrument, other: Instrument, start: Alignment) -> Alignment | None:
+    """The same by how far both went all along the run, where that is surer; None where it is not.
+
+    A speed of markers is smoothed; it is compared with the reference as it is, and smoothed alike.
+    """
+    if reference.speed is None or other.speed is None:
+        return None
+    one, two = _turned(reference), _turned(other)
+    two = _in_unit_of(reference, other, two)
+    unlike = clocks.UNLIKE
+    if (reference.ground is None) != (other.ground is None):
+        wheel = reference if reference.ground is None else other
+        unlike = RADII if wheel.radius is not None else FREE
+    courses = [one]
+    if other.ground is not None and reference.ground is None:
+        courses.append(_smoothed(one))
+    found = [by_course(course, two, start, unlike, clocks.UNLIKE) for course in courses]
+    surer = [a for a in found if a is not None and a.offset_std < start.offset_std]
+    return min(surer, key=lambda a: a.offset_std, default=None)
+
+
+def _turned(one: Instrument) -> Signal:
+    """How far a wheel has turned, rad; of markers, the chair's way over the usual radius."""
+    angle = one.channels.get(f"{one.side}_wheel_angle")
+    if angle is not None and one.ground is None:
+        there = np.isfinite(angle)
+        return Signal(one.time[there], angle[there])
+    time, speed = _course(one)
+    steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(time)
+    return Signal(time, np.r_[0.0, np.cumsum(steps)])
+
+
+def _smoothed(course: Signal) -> Signal:
+    """A course of even samples whose speed is smoothed as that of markers is."""
+    step = float(np.median(np.diff(course.time)))
+    time = np.arange(course.time[0], course.time[-1], step)
+    width = 2 * max(2, round(SMOOTH / step)) + 1
+    if width > time.size:
+        return course
+    even = np.interp(time, course.time, course.values)
+    speed = savgol_filter(even, width, 2, deriv=1, delta=step)
+    return Signal(time, np.r_[0.0, np.cumsum(0.5 * (speed[1:] + speed[:-1]) * step)])
+
+
+def heading_at(instruments: Sequence[Instrument], begin: float) -> float | None:
+    """Where the chair faces in the laboratory, rad, as a trial begins (s); None: nothing tells."""
+    for one in instruments:
+        if one.facing is None:
+            continue
+        seen = np.isfinite(one.facing) & (one.time >= begin) & (one.time <= begin + EARLY[1])
+        if seen.any():
+            first = one.time[seen][0]
+            early = one.facing[seen & (one.time <= first + EARLY[0])]
+            return float(np.angle(np.exp(1j * early).mean()))
+    return None
 
 
 def _of_wheels(ours: Sequence[Instrument], other: Instrument) -> tuple[Signal, Signal]:
@@ -206,10 +286,8 @@ def _frame(one: Instrument, ours: Sequence[Instrument]) -> tuple[Instrument, lis
     rows = [
         f"{a} ({', '.join(f'{v:+.2f}' for v in r)})" for a, r in zip("xyz", sits.axes, strict=True)
     ]
-    notes.append(
-        f"{one.name}: on the frame; forward is {how}; the chair's axes in its own: "
-        + "; ".join(rows)
-    )
+    place = f"{one.name}: on the frame; forward is {how}; the chair's axes in its own: "
+    notes.append(Detail(place + "; ".join(rows)))
     channels = dict(one.channels)
     for i, axis in enumerate("xyz"):
         channels[f"imu_gyro.{axis}"] = gyroscope @ sits.axes[i]
@@ -241,7 +319,8 @@ def _check_sides(name: str, ours: Sequence[Instrument]) -> list[str]:
         )
     if match < 0.5:
         return [f"{name}: the gyroscope does not tell the sides of the wheels ({match:.2f})"]
-    return [f"{name}: the gyroscope confirms the sides of the wheels (correlation {match:.2f})"]
+    said = f"{name}: the gyroscope confirms the sides of the wheels (correlation {match:.2f})"
+    return [Detail(said)]
 
 
 def _span(ours: Sequence[Instrument]) -> tuple[float, float]:

@@ -16,12 +16,20 @@ from mjchair.rider.anatomy import JOINT_NAMES
 LOOSE = 0.3  # relative standard deviation of a mass that nobody has weighed
 ENOUGH = 3  # trials of one manoeuvre, from which on one is kept for the final check
 COLUMN = 44  # where comments begin
+HEADINGS = (
+    "Headings are in the laboratory's axes: z up, x the axis nearest to where the chair faces as "
+    "the first trial begins"
+)
 
 
 def study_text(
-    trials: Sequence[GatheredTrial], noise: Mapping[str, float], known: Known, radius: float | None
+    trials: Sequence[GatheredTrial],
+    noise: Mapping[str, float],
+    known: Known,
+    radius: float | None,
+    shared: Sequence[str] = (),
 ) -> str:
-    """The text of study.toml."""
+    """The text of study.toml; `shared`: lines on clocks that several trials share."""
     out = ["# Made by `mjchair gather`; every line may be changed by hand. Units are SI."]
     out += [_line('model = "manual"', "the chair that is to explain these runs, or a path to MJCF")]
     out += _rider(trials)
@@ -41,6 +49,9 @@ def study_text(
         out += [
             _line(f'"{name}" = {size:g}', unit_of(name)) for name, size in sorted(noise.items())
         ]
+    out += ["", *(f"# {line}" for line in shared)] if shared else []
+    if any(trial.heading is not None for trial in trials):
+        out += ["", f"# {HEADINGS}"]
     kept = _held_out(trials)
     for trial in trials:
         out += ["", *_trial(trial, trial is kept)]
@@ -137,4 +148,10 @@ def _trial(trial: GatheredTrial, held_out: bool) -> list[str]:
     out.append(_line(f'manoeuvre = "{trial.manoeuvre}"', f"{word}; runs of one word are compared"))
     kept = "kept for the final check" if held_out else "used to fit"
     out.append(_line(f"hold_out = {'true' if held_out else 'false'}", f"{kept}; keep at least one"))
+    for name, found in trial.alignments.items():
+        out.append(f"# clock of {name}: {found.text()}")
+    if trial.heading is not None:
+        out.append("[trial.initial]")
+        way = "rad, where the chair faces at first, not where it goes; by markers"
+        out.append(_line(f"heading = {trial.heading:.4f}", way))
     return out
