@@ -10,7 +10,6 @@ from five_segments import Chair, Hidden, Person
 from lab_formats import Rim, Style
 from raw_files import (
     LATE,
-    TORQUE,
     Plan,
     clocks,
     gather_command,
@@ -35,7 +34,7 @@ from mjchair.motion.marker_set import find_marker_set
 from mjchair.report.gathered import gathered_figure
 from mjchair.simulation.table import Table
 
-PLAN = Plan(Person(torque=TORQUE), Hidden(rolling=0.005), pushes=1, coasts=0, seconds=6.0)
+PLAN = Plan(Person(torque=16.0), Hidden(rolling=0.005), pushes=1, coasts=0, seconds=6.0)
 
 
 @pytest.fixture(scope="module")
