@@ -592,3 +592,29 @@ def test_a_wind_that_ends_nearly_still_is_no_wind(sigmas, there):
             variant=Variant((), terms=(term,)), sigmas={term.effect.key: sigmas}
         )
         assert choice.is_there(ended) is expected
+
+
+@pytest.mark.parametrize(
+    ("total", "promised", "afar"),
+    [
+        (1400.0, 1395.0, False),  # it gets to what it promises
+        (1400.0, 1300.0, False),  # stuck, and clearly better than the part
+        (1490.0, 1300.0, True),  # stuck where the part was
+        (2100.0, 2100.0, True),  # worse than nothing
+    ],
+)
+def test_a_fit_begins_from_afar_only_where_the_near_one_is_stuck(
+    monkeypatch, total, promised, afar
+):
+    begun = []
+
+    def begin(self, share):
+        begun.append(self.near)
+        return fit(total, promised=promised) if self.near else fit(1200.0)
+
+    monkeypatch.setattr(multistart.MultiStart, "_from", begin)
+    starts = multistart.MultiStart(
+        base=searching().base, hypothesis=BOTH, near="near", part=fit(1500.0), best=None, note=print
+    )
+    assert starts.fit().total == (1200.0 if afar else total)
+    assert begun == (["near", None] if afar else ["near"])

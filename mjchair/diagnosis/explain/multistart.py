@@ -81,14 +81,13 @@ class MultiStart:
         """The fit that began near another, or one from afar where that one is stuck.
 
         What the others had to be without this effect may be a valley of its own: with another
-        wheel a caster lifts off.
+        wheel a caster lifts off. A fit that is clearly better than the part near which it began
+        has left that valley.
         """
-        if (
-            near is not None
-            and gain(self.base, near) >= 0.0
-            and not rules.is_stuck(total=near.total, promised=near.promised)
-        ):
-            return near
+        if near is not None and gain(self.base, near) >= 0.0:
+            better = self.part is not None and self.part.total - near.total > rules.WORTH
+            if better or not rules.is_stuck(total=near.total, promised=near.promised):
+                return near
         afar = replace(self, near=None)._from(1.0)
         fits = [f for f in (near, afar) if f is not None]
         return min(fits, key=attrgetter("total"), default=None)
