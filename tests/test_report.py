@@ -372,3 +372,14 @@ def test_mean_forces_are_not_drawn_towards_zero():
     value, std = mean_forces(products, pulses, Force.FORWARD, level)
     np.testing.assert_allclose(value, truth, rtol=1e-3)
     assert (std > 1.0).all()
+
+
+def test_what_harmonics_say_together_stands_in_place_of_six_numbers():
+    found = diagnosis(Verdict.NAMED)
+    said = "its mass times its displacement goes 1.10 kg m to both sides"
+    harmonics = {f"sine_{k}": Estimate(value=-0.069, std=0.091, unit="kg m") for k in (1, 2, 3)}
+    moves = NamedEffect(name="rider_motion", parameters=harmonics, closure=0.8, remark=said)
+    found.effects = [moves]
+    html = page(found, {})
+    first = html[: html.index("What to do next")]
+    assert said in first and "-0.069" not in first

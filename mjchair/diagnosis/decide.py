@@ -33,6 +33,7 @@ from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.process import NAMED, level
 from mjchair.diagnosis.fit.slow_part import BAND
+from mjchair.diagnosis.fit.variant import Term
 from mjchair.diagnosis.material import material
 from mjchair.diagnosis.next_experiment import design, wording
 from mjchair.diagnosis.next_experiment.design import Plan
@@ -235,7 +236,15 @@ def _named(fitted: Fitted, closed: float) -> list[NamedEffect]:
             for p in term.effect.parameters
         }
         name, channel = term.effect.name, term.effect.channel
-        out.append(NamedEffect(name=name, parameters=parameters, closure=closed, channel=channel))
+        out.append(
+            NamedEffect(
+                name=name,
+                parameters=parameters,
+                closure=closed,
+                channel=channel,
+                remark=_remark(fitted, term),
+            )
+        )
     return out
 
 
@@ -322,14 +331,12 @@ def missing(gap: Gap) -> list[MissingForce]:
     ][:FORCES]
 
 
-def _remarks(fitted: Fitted) -> list[str]:
-    """What the values of effects say in a sentence, of those that have one."""
-    out = []
-    for term in fitted.variant.terms:
-        std = {p.name: fitted.std.get(key, 0.0) for key, p in term.parameters}
-        if term.effect.remark is not None:
-            out.append(term.effect.remark(term.values, std))
-    return out
+def _remark(fitted: Fitted, term: Term) -> str:
+    """What the values of an effect say in a sentence; empty where they say it themselves."""
+    if term.effect.remark is None:
+        return ""
+    std = {p.name: fitted.std.get(key, 0.0) for key, p in term.parameters}
+    return term.effect.remark(term.values, std)
 
 
 def _notes(
@@ -347,7 +354,8 @@ def _notes(
         for name in (_walls(choice) if choice else [])
     ]
     if choice is not None and said in (Verdict.NAMED, Verdict.AMBIGUOUS):
-        notes += _remarks(choice.fitted)
+        said_of = (_remark(choice.fitted, term) for term in choice.fitted.variant.terms)
+        notes += [line for line in said_of if line]
     if said != Verdict.UNKNOWN:
         return notes
     if choice is not None:

@@ -55,12 +55,14 @@ class NamedEffect:
     Attributes:
       name, channel: of the effect; a channel only for effects of a sensor.
       closure: share of the excess that all named effects close together.
+      remark: what the parameters say together, where that is no list of numbers; else empty.
     """
 
     name: str
     parameters: Mapping[str, Estimate]
     closure: float
     channel: str | None = None
+    remark: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """As in diagnosis.json."""

@@ -273,9 +273,9 @@ def notes(diagnosis: Diagnosis) -> list[str]:
 
 
 def effect_words(effect: NamedEffect) -> str:
-    """Name and parameters of an effect."""
+    """Name of an effect, and its parameters or what they say together."""
     on = f" on {effect.channel}" if effect.channel else ""
-    return f"{bold(effect.name)}{on} ({', '.join(_parameters(effect))})"
+    return f"{bold(effect.name)}{on} ({effect.remark or ', '.join(_parameters(effect))})"
 
 
 def _parameters(effect: NamedEffect) -> Iterable[str]:
