@@ -26,8 +26,7 @@ def person_force(study: Study, run: Run) -> tuple[Array, Array]:
     """Times (n,) s, and the size (n,) N of the force there; 0 where nothing tells of a person.
 
     With a measured motion it is the rider's mass times the acceleration of the motion. Without one
-    it is what the hands push, which is of the size of what trunk and arms do (Chenier et al. 2016:
-    within a stroke the speed of a rigid chair is off by as much as it changes).
+    it is what the hands push, taken as about the size of what trunk and arms do (assumption).
     """
     time = np.arange(run.trial.time[0], run.trial.time[-1] + STEP, STEP)
     measured = [motion.acceleration_at(time) for motion in motions(run).values()]
