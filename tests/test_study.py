@@ -13,6 +13,7 @@ from mjchair.errors import MjchairError
 from mjchair.measurement import samples
 from mjchair.measurement.trial import Trial
 from mjchair.model import parts
+from mjchair.model.rolling import rear_axle
 from mjchair.simulation.initial import Initial
 from mjchair.tire import block
 
@@ -294,6 +295,43 @@ def test_how_a_chair_rocks_as_it_stops_is_in_no_window():
     kept = time[rows]
     assert kept.min() < 1.0 and kept.max() > 9.0  # the chair still stands: that it does is told
     assert not np.any((kept > first + 0.01) & (kept < after - 0.01))
+
+
+@pytest.mark.parametrize("kind", ["left angle", "angles", "places"])
+def test_angles_and_places_tell_as_well_as_speeds_when_a_chair_stops(kind):
+    """A coast whose wheels had angles alone was fitted through its stop: chi2 of 400 a window."""
+    time = np.arange(0.0, 10.0, 1.0 / 240.0)
+    speed = np.maximum(1.0 - 0.125 * time, 0.0)  # m/s; it stands from 8 s on
+    way = np.cumsum(speed) * (time[1] - time[0])
+    rng = np.random.default_rng(1)
+    tick = 2.0 * np.pi / 4096.0
+    angle = np.round(way / 0.3 / tick) * tick
+    place = {
+        f"position.{axis}": by * way + 5e-4 * rng.standard_normal(time.size)
+        for axis, by in (("x", 0.8), ("y", -0.6))
+    }
+    wheels = {f"{side}_wheel_angle": angle for side in ("left", "right")}
+    columns = {
+        "left angle": {"left_wheel_angle": angle}, "angles": wheels, "places": place
+    }[kind]  # fmt: skip
+    ((first, _),) = standstill.rests(_run(time, columns).trial)
+    assert 7.6 < first < 8.0
+    assert standstill.rests(_run(time[time < 7.5], _cut(columns, time < 7.5)).trial) == []
+
+
+def _cut(columns, kept):
+    return {name: values[kept] for name, values in columns.items()}
+
+
+def test_wheel_angles_tell_yaw_rate_as_wheel_speeds_do():
+    axle = rear_axle(mjchair.load_spec("manual").compile())
+    time = np.arange(0.0, 2.0, 0.01)
+    speeds = {"left_wheel_speed": 3.0 + 0.0 * time, "right_wheel_speed": 3.5 + 0.0 * time}
+    angles = {name.replace("speed", "angle"): w * time for name, w in speeds.items()}
+    told = [first_state.initial(_run(time, columns), axle) for columns in (speeds, angles)]
+    assert told[0].yaw_rate > 0.1
+    assert told[1].yaw_rate == pytest.approx(told[0].yaw_rate, rel=1e-9)
+    assert told[1].speed == pytest.approx(told[0].speed, rel=1e-9)
 
 
 def test_a_chair_that_turns_back_or_begins_at_rest_does_not_come_to_rest():

@@ -17,6 +17,7 @@ from mjchair.simulation.initial import Initial
 Array = NDArray[np.float64]
 STANDS = (0.03, 0.05)  # m/s and rad/s, below which a chair stands
 SIDES = ("left", "right")
+KINDS = ("speed", "angle")  # of a wheel's channels
 SPAN = 0.3  # s, of the line through the first samples
 CHORD = 0.5  # m, of the way at whose start the heading is read off
 
@@ -39,8 +40,9 @@ def observed(run: Run) -> NDArray[np.bool_]:
     """Which of the slow states (chair.SLOW) the run's channels see directly, (7,)."""
     have = set(run.trial.channels)
     place = {"position.x", "position.y"} <= have
-    rolls = bool(have & {"left_wheel_speed", "right_wheel_speed", "left_wheel_angle", "velocity.x"})
-    both = {"left_wheel_speed", "right_wheel_speed"} <= have
+    wheels = {f"{side}_wheel_{kind}" for side in SIDES for kind in KINDS}
+    rolls = bool(have & {*wheels, "velocity.x"})
+    both = any({f"left_wheel_{kind}", f"right_wheel_{kind}"} <= have for kind in KINDS)
     return np.array(
         [
             "position.x" in have,
@@ -167,8 +169,10 @@ def _yaw_rate(run: Run, axle: RearAxle) -> float:
     gyro = _first(run, "imu_gyro.z")
     if gyro is not None:
         return gyro[0]
-    left, right = _first(run, "left_wheel_speed"), _first(run, "right_wheel_speed")
-    if left is not None and right is not None:
-        return (right[0] * axle.right - left[0] * axle.left) / axle.track
+    for kind in KINDS:
+        left, right = (_first(run, f"{side}_wheel_{kind}") for side in SIDES)
+        if left is not None and right is not None:
+            order = KINDS.index(kind)  # of the derivative that is a speed
+            return (right[order] * axle.right - left[order] * axle.left) / axle.track
     heading = _first(run, "heading")
     return heading[1] if heading is not None else 0.0

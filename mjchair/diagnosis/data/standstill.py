@@ -1,23 +1,26 @@
 """Where a measured chair stands, and where it comes to rest.
 
 In: a run. Out: stretches of its samples in which the chair stands, and the times around each stop
-that no fit uses. A tire that stops pushes the chair back a little and the chair rocks; how much and
+that no fit uses. Whatever tells the speed is used: wheel speeds, wheel angles, a velocity, or
+places over time. A tire that stops pushes the chair back a little and the chair rocks; how much and
 how long is an assumption in every model and differs from chair to chair.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.measurement.trial import Trial
 
-SLOWEST = {  # channel -> average below which the chair stands, rad/s and m/s
-    "left_wheel_speed": 0.05,
-    "right_wheel_speed": 0.05,
-    "velocity.x": 0.02,
-}
+Array = NDArray[np.float64]
+
+WHEEL = 0.05  # rad/s, average below which a wheel stands
+CHAIR = 0.02  # m/s, the same of a chair
 SPAN = 0.1  # s, over which they are averaged
+SPAN_OF_PLACES = 0.3  # s: a place is known to a millimetre or so, an angle far better
 STANDS = 0.8  # s, the shortest stand: a chair that turns back stands for less
 ROCKING = 3.0  # times those averages: a chair that rocks to rest is slower
 ROLLS = 1.0  # s, at least, before a stop: less holds no window
@@ -54,16 +57,46 @@ def rests(trial: Trial) -> list[tuple[float, float]]:
 
 
 def _slower(trial: Trial, factor: float = 1.0) -> NDArray[np.bool_]:
-    """Which samples are slower than `factor` times SLOWEST in every channel; none if no channel."""
-    time = trial.time
-    seen = [name for name in SLOWEST if name in trial.channels]
-    slow = np.full(time.size, bool(seen))
-    width = max(3, int(SPAN / max(float(np.median(np.diff(time))), 1e-4)))
-    for name in seen:
-        filled = np.interp(time, *trial.samples(name))
-        smooth = np.convolve(filled, np.ones(width) / width, mode="same")
-        slow &= np.abs(smooth) <= factor * SLOWEST[name]
+    """Which samples are slower than `factor` times what stands; none if no channel tells."""
+    speeds = list(_speeds(trial))
+    slow = np.full(trial.time.size, bool(speeds))
+    for speed, least in speeds:
+        slow &= speed <= factor * least
     return slow
+
+
+def _speeds(trial: Trial) -> Iterator[tuple[Array, float]]:
+    """Averaged sizes of speeds (n,), each with that below which it stands, rad/s or m/s."""
+    known = set(trial.channels)
+    for side in ("left", "right"):
+        if f"{side}_wheel_speed" in known:
+            yield np.abs(_averaged(trial, _filled(trial, f"{side}_wheel_speed"), SPAN)), WHEEL
+        elif f"{side}_wheel_angle" in known:
+            yield np.abs(_slope(trial, f"{side}_wheel_angle", SPAN)), WHEEL
+    if "velocity.x" in known:
+        yield np.abs(_averaged(trial, _filled(trial, "velocity.x"), SPAN)), CHAIR
+    elif not any("_wheel_" in name for name in known) and {"position.x", "position.y"} <= known:
+        forward, left = (_slope(trial, f"position.{axis}", SPAN_OF_PLACES) for axis in "xy")
+        yield np.hypot(forward, left), CHAIR
+
+
+def _filled(trial: Trial, channel: str) -> Array:
+    """The samples of a channel at all times of its run, (n,)."""
+    return np.interp(trial.time, *trial.samples(channel))
+
+
+def _slope(trial: Trial, channel: str, span: float) -> Array:
+    """Mean slope of a channel over `span` (s) around each sample, (n,)."""
+    time, values = trial.time, _filled(trial, channel)
+    begin, end = (np.clip(time + by, time[0], time[-1]) for by in (-0.5 * span, 0.5 * span))
+    risen = np.interp(end, time, values) - np.interp(begin, time, values)
+    return np.asarray(risen / np.maximum(end - begin, 1e-9))
+
+
+def _averaged(trial: Trial, values: Array, span: float) -> Array:
+    """Values (n,) averaged over `span` (s) around each sample."""
+    width = max(3, int(span / max(float(np.median(np.diff(trial.time))), 1e-4)))
+    return np.convolve(values, np.ones(width) / width, mode="same")
 
 
 def _stretches(held: NDArray[np.bool_]) -> list[tuple[int, int]]:
