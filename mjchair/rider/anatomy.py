@@ -158,7 +158,7 @@ def _arm_joints(side: str) -> tuple[Joint, ...]:
     y = SIDES[side]
     arm, forearm, hand = f"{side}_upper_arm", f"{side}_forearm", f"{side}_hand"
     return (
-        _joint(f"{side}_shoulder_flexion", arm, (0, -1, 0), (-60, 180), "the arm swings forward"),
+        _joint(f"{side}_shoulder_flexion", arm, (0, -1, 0), (-90, 180), "the arm swings forward"),
         _joint(f"{side}_shoulder_abduction", arm, (y, 0, 0), (-45, 180), "away from the body"),
         _joint(f"{side}_shoulder_rotation", arm, (0, 0, -y), (-90, 90), "inwards"),
         _joint(f"{side}_elbow_flexion", forearm, (0, -1, 0), (-5, 150), "the elbow bends"),
@@ -171,7 +171,9 @@ def _arm_joints(side: str) -> tuple[Joint, ...]:
 # Several joints of a segment turn one after the other in this order, the first next to its parent.
 # Ranges: American Academy of Orthopaedic Surgeons, Joint Motion (1965). Assumptions: the trunk,
 # which turns about the hips here, bends forward to 90 deg and back to -40 deg; inward rotation of
-# the shoulder has the range of outward rotation (90 deg), adduction 45 deg.
+# the shoulder has the range of outward rotation (90 deg), adduction 45 deg. The arm swings back to
+# -90 deg instead of -60 deg: the shoulder blade goes with it, which is part of the trunk here, and
+# arms of racers are beyond 60 deg in their recovery.
 JOINTS = (
     _joint("trunk_flexion", "trunk", (0, 1, 0), (-40, 90), "the trunk bends forward"),
     _joint("trunk_lean", "trunk", (1, 0, 0), (-35, 35), "the trunk leans to the right"),
