@@ -44,11 +44,20 @@ def test_a_gap_that_nothing_gains_on_is_unknown():
     [
         {"closure": rules.PARTLY - 0.01},
         {"gain_by_run": rules.HELD - 0.1},
-        {"held_out": HeldOut(before=1000.0, after=900.0, dof=100.0, changed=900.0)},
+        {"held_out": HeldOut(before=1000.0, after=1001.0, dof=100.0, changed=900.0)},
     ],
 )
 def test_each_of_these_alone_makes_it_unknown(reason):
     assert said(**reason) == Verdict.UNKNOWN
+
+
+def test_what_closes_little_of_a_held_out_gap_is_an_answer_beside_which_more_is_missing():
+    """A drag of the air that closed 97 % of a gap, and 36 % held out, was no answer at all."""
+    held = HeldOut(before=264.0, after=216.0, dof=130.0, changed=317.0)
+    assert said(held_out=held) == Verdict.AMBIGUOUS
+    assert rules.more_missing(replace(CLEAR, held_out=held), walls=0)
+    assert said(held_out=replace(held, after=196.0)) == Verdict.NAMED
+    assert said(held_out=replace(held, after=265.0)) == Verdict.UNKNOWN
 
 
 @pytest.mark.parametrize(

@@ -145,7 +145,8 @@ def verdict(gap: bool, choice: Standing | None) -> Verdict:
     alone = not choice.rivals and not choice.once and choice.probability >= PROBABLE
     # in a single run nothing tells an effect from what is left beside it
     whole = not choice.gap_left or choice.runs > 1
-    named = sure(choice) and alone and whole and choice.closure >= CLOSES
+    carried = choice.held_out is None or carries_over(choice.held_out)
+    named = sure(choice) and alone and whole and carried and choice.closure >= CLOSES
     return Verdict.NAMED if named else Verdict.AMBIGUOUS
 
 
@@ -156,7 +157,7 @@ def explains(choice: Standing) -> bool:
     if choice.held_out is None:
         return choice.gain_by_run >= HELD
     foretold = choice.gain_by_run >= HELD or shows_again(choice.held_out)
-    return foretold and carries_over(choice.held_out)
+    return foretold and not opens_a_gap(choice.held_out)
 
 
 def carries_over(held: HeldOut) -> bool:
@@ -171,6 +172,18 @@ def carries_over(held: HeldOut) -> bool:
     if min(gap, held.changed) <= scatter:
         return left < gap + scatter
     return left < max(gap - CARRIED * min(gap, held.changed), scatter)
+
+
+def opens_a_gap(held: HeldOut) -> bool:
+    """Whether the effects are worse than nothing on held-out trials, beyond the scatter of noise.
+
+    Where a gap shows that they change, they must bring something. What brings less than
+    `carries_over` asks is an answer beside which more is missing.
+    """
+    scatter = _scatter(held.dof)
+    gap, left = held.before - held.dof, held.after - held.dof
+    shown = min(gap, held.changed) > scatter
+    return left >= (gap if shown else gap + scatter)
 
 
 def shows_again(held: HeldOut) -> bool:
@@ -223,7 +236,9 @@ def more_missing(choice: Standing, walls: int) -> bool:
         is missing pushed them.
     """
     held = choice.held_out
-    wrong = held is not None and foretells_wrongly(held.after, held.dof)
+    wrong = held is not None and (
+        foretells_wrongly(held.after, held.dof) or not carries_over(held)
+    )
     return choice.gap_left or choice.closure < CLOSES or walls > 0 or wrong
 
 
