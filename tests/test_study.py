@@ -323,6 +323,27 @@ def _cut(columns, kept):
     return {name: values[kept] for name, values in columns.items()}
 
 
+def test_a_chair_that_is_pushed_to_and_fro_before_it_rolls_is_used_from_there():
+    """Bodies that swing on a chair at rest rock it on its tires: no fit follows that."""
+    time = np.arange(0.0, 8.0, 0.01)
+    dithers = np.where((time > 1.0) & (time < 3.0), 0.3 * np.sin(4.0 * np.pi * time), 0.0)
+    speed = dithers + np.maximum(time - 3.0, 0.0)
+    run = _run(time, {"left_wheel_speed": speed, "right_wheel_speed": speed})
+    ((begin, onward),) = standstill.rests(run.trial)
+    assert begin == 0.0 and 2.9 < onward < 3.2
+    assert min(w.rows[0] for w in cut([run], 0.002)) * 0.01 > 2.9
+
+
+def test_a_chair_that_stands_as_its_run_ends_has_come_to_rest():
+    """A coast that stood for its last 0.7 s was fitted through its stop."""
+    time = np.arange(0.0, 8.0, 0.01)
+    speed = np.maximum(3.0 - 0.4 * time, 0.0)  # stands from 7.5 s on
+    run = _run(time, {"left_wheel_speed": speed, "right_wheel_speed": speed})
+    ((first, _),) = standstill.rests(run.trial)
+    assert 7.1 < first < 7.5
+    assert standstill.rests(_run(time[:730], {"left_wheel_speed": speed[:730]}).trial) == []
+
+
 def test_wheel_angles_tell_yaw_rate_as_wheel_speeds_do():
     axle = rear_axle(mjchair.load_spec("manual").compile())
     time = np.arange(0.0, 2.0, 0.01)

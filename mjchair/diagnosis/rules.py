@@ -236,9 +236,7 @@ def more_missing(choice: Standing, walls: int) -> bool:
         is missing pushed them.
     """
     held = choice.held_out
-    wrong = held is not None and (
-        foretells_wrongly(held.after, held.dof) or not carries_over(held)
-    )
+    wrong = held is not None and (foretells_wrongly(held.after, held.dof) or not carries_over(held))
     return choice.gap_left or choice.closure < CLOSES or walls > 0 or wrong
 
 

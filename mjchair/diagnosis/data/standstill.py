@@ -1,9 +1,10 @@
-"""Where a measured chair stands, and where it comes to rest.
+"""Where a measured chair stands, where it comes to rest, and where it dithers before it rolls.
 
-In: a run. Out: stretches of its samples in which the chair stands, and the times around each stop
-that no fit uses. Whatever tells the speed is used: wheel speeds, wheel angles, a velocity, or
-places over time. A tire that stops pushes the chair back a little and the chair rocks; how much and
-how long is an assumption in every model and differs from chair to chair.
+In: a run. Out: stretches of its samples in which the chair stands, and the times, around each stop
+and before a start that is not clean, that no fit uses. Whatever tells the speed is used: wheel
+speeds, wheel angles, a velocity, or places over time. A tire that stops pushes the chair back a
+little and the chair rocks; how much and how long is an assumption in every model and differs from
+chair to chair.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from mjchair.measurement.trial import Trial
 
@@ -22,8 +24,9 @@ CHAIR = 0.02  # m/s, the same of a chair
 SPAN = 0.1  # s, over which they are averaged
 SPAN_OF_PLACES = 0.3  # s: a place is known to a millimetre or so, an angle far better
 STANDS = 0.8  # s, the shortest stand: a chair that turns back stands for less
+STANDS_AT_END = 0.2  # s, the same as a run ends: whether the chair turns back is not seen
 ROCKING = 3.0  # times those averages: a chair that rocks to rest is slower
-ROLLS = 1.0  # s, at least, before a stop: less holds no window
+ROLLS = 1.0  # s, at least, before a stop or after a start: less holds no window
 BEFORE = 0.1  # s before the chair stands, as long as the average
 ROCKS = 2.0  # s after that: the chairs that ship rock for about as long, by assumed tire damping
 
@@ -39,21 +42,57 @@ def still_stretches(trial: Trial, shortest: float = STANDS) -> list[tuple[int, i
 
 
 def rests(trial: Trial) -> list[tuple[float, float]]:
-    """From when to when (s) a run is left out, for each time that the chair comes to rest.
+    """From when to when (s) a run is left out: where the chair comes to rest, or dithers at first.
 
-    A run that begins at rest does not come to rest there.
+    A run that begins at rest does not come to rest there, but a person who moves on a chair at rest
+    may push it to and fro until it rolls on.
     """
     time, slow, rocking = trial.time, _slower(trial), _stretches(_slower(trial, ROCKING))
     out: dict[int, int] = {}
-    for first, after in still_stretches(trial):
+    for first, after in _stands(trial, slow):
         # it first stood where it began to rock
         begins = max(a for a, b in rocking if a <= first < b)
         out[begins + int(np.argmax(slow[begins:]))] = after
-    return [
+    stops = [
         (float(time[a]) - BEFORE, min(float(time[a]) + ROCKS, float(time[b - 1])))
         for a, b in out.items()
         if time[a] - time[0] > ROLLS
     ]
+    begins = rolls_on(trial)
+    later = [(a, b) for a, b in stops if a > begins]
+    return later if begins == time[0] else [(float(time[0]), begins), *later]
+
+
+def rolls_on(trial: Trial) -> float:
+    """When (s) a chair that dithers at first rolls on for good; the first time where none does.
+
+    A chair that stands at first, and leaves its place once, does not dither.
+    """
+    time, slow = trial.time, _stretches(_slower(trial))
+    if not slow or slow[0][0] > 0:
+        return float(time[0])
+    follows = [*(time[a] for a, _ in slow[1:]), time[-1]]
+    for k, ((_, after), then) in enumerate(zip(slow, follows, strict=True)):
+        if after < time.size and then - time[after] > ROLLS:
+            return float(time[after] if k > 0 else time[0])
+    return float(time[0])
+
+
+def rolls_at(trial: Trial, times: Array) -> NDArray[np.bool_]:
+    """Whether a channel shows at each of the times (n,), s, that the chair rolls."""
+    rolls = np.zeros(trial.time.size, bool)
+    for speed, least in _speeds(trial):
+        rolls |= speed > least
+    at = np.clip(np.searchsorted(trial.time, times), 0, trial.time.size - 1)
+    return np.asarray(rolls[at])
+
+
+def _stands(trial: Trial, slow: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """The stretches in which the chair stands; as the run ends, a short one does."""
+    time = trial.time
+    last = [(a, b) for a, b in _stretches(slow)[-1:] if b == time.size]
+    ends = [(a, b) for a, b in last if time[-1] - time[a] > STANDS_AT_END]
+    return [*dict.fromkeys([*still_stretches(trial), *ends])]
 
 
 def _slower(trial: Trial, factor: float = 1.0) -> NDArray[np.bool_]:
@@ -96,7 +135,7 @@ def _slope(trial: Trial, channel: str, span: float) -> Array:
 def _averaged(trial: Trial, values: Array, span: float) -> Array:
     """Values (n,) averaged over `span` (s) around each sample."""
     width = max(3, int(span / max(float(np.median(np.diff(trial.time))), 1e-4)))
-    return np.convolve(values, np.ones(width) / width, mode="same")
+    return np.asarray(uniform_filter1d(values, width, mode="nearest"))
 
 
 def _stretches(held: NDArray[np.bool_]) -> list[tuple[int, int]]:

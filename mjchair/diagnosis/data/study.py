@@ -161,18 +161,27 @@ def _without_heading(runs: list[Run]) -> list[str]:
 
 
 def _coming_to_rest(runs: list[Run]) -> list[str]:
-    """A note on what is left out where runs come to rest."""
-    stops = [
-        f"{run.trial.name} at {(first + standstill.BEFORE):.1f} s"
-        for run in runs
-        for first, _ in standstill.rests(run.trial)
-    ]
-    if not stops:
-        return []
-    return [
-        f"comes to rest: {', '.join(stops)}; how a chair rocks on its tires then is not known, and "
-        f"{standstill.ROCKS:g} s are left out from there, or what there is until it moves again"
-    ]
+    """Notes on what is left out where runs come to rest, or dither before they roll."""
+    stops, starts = [], []
+    for run in runs:
+        for first, onward in standstill.rests(run.trial):
+            if first == run.trial.time[0]:
+                starts.append(f"{run.trial.name} until {onward:.1f} s")
+            else:
+                stops.append(f"{run.trial.name} at {(first + standstill.BEFORE):.1f} s")
+    notes = []
+    if stops:
+        notes.append(
+            f"comes to rest: {', '.join(stops)}; how a chair rocks on its tires then is not known, "
+            f"and {standstill.ROCKS:g} s are left out from there, or what there is until it moves "
+            "again"
+        )
+    if starts:
+        notes.append(
+            f"moves to and fro at rest: {', '.join(starts)}; how a chair rocks on its tires then "
+            "is not known, and the time until it rolls on is left out"
+        )
+    return notes
 
 
 def _checked(trial: Trial, axle: RearAxle) -> tuple[Trial, list[str]]:

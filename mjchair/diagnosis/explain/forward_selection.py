@@ -7,7 +7,7 @@ grows as long as it leaves a gap and a further effect is worth it.
 from __future__ import annotations
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import alternatives
+from mjchair.diagnosis.explain import alternatives, whole_sizes
 from mjchair.diagnosis.explain.choice import Tried
 from mjchair.diagnosis.explain.fits import Fits, goes_far
 from mjchair.diagnosis.explain.left_out import held_out, with_terms
@@ -29,7 +29,7 @@ def grown(fits: Fits) -> WithGap | None:
     """
     if not _promises(fits):
         return None
-    here = _found(fits)
+    here = _found(fits) or _left_over_together(fits)
     size = len(here[0].hypothesis.starts) if here else 0
     while size < rules.MOST and (here is None or here[1].exists):
         size += 1
@@ -65,6 +65,25 @@ def _found(fits: Fits) -> WithGap | None:
     best = Tried(fits.weigh(known.starts), known.fitted)
     fits.tried.append(best)
     return best, fits.gap_after(best.fitted)
+
+
+def _left_over_together(fits: Fits) -> WithGap | None:
+    """Several effects that were left over while the noise was sought; None: one may be enough.
+
+    Where the best single effect leaves a gap and these leave none, the usual way from one effect
+    to several is not gone. Of a caster that shimmies small changes tell nothing.
+    """
+    count = len(alternatives.left_over(fits.base))
+    single = best_single(fits)
+    if count < 2 or single is None or whole_sizes.shimmies(fits.base):
+        return None
+    alone = fits.believed(single)
+    if alone is not None and not fits.gap_after(alone.fitted).exists:
+        return None
+    together = _fitted_before(fits, count)
+    if together is None or together[1].exists:
+        return None
+    return together if alone is None or is_worth(fits, alone, together[0]) else None
 
 
 def further(fits: Fits, best: Tried | None, size: int) -> WithGap | None:

@@ -5,7 +5,7 @@ In: a study and effects. Out: a `Base`, on which everything after it rests.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -179,19 +179,34 @@ def _noise_left(base: Base, bench: Bench, reduced: Reduced) -> tuple[Bench, Foun
     Args:
       bench, reduced: by which the best is found and fitted.
     """
-    best = _best(reduced, base.starts)
+    options = _best_of_sizes(reduced, base.starts)
     here = base.around.track
-    own: dict[ColumnId, Column] = {c: base.columns[c] for c in best.columns} if best else {}
-    found = None
-    if best is not None and best.gain > rules.needed(best.free):
-        start = replace(base.around.variant, terms=hypotheses.terms(reduced, best))
-        try:
-            fitted = refit(bench, start, here, base.nuisances, ROUNDS)
-            here, found = fitted.track, Found(best.starts, fitted)
-            own = effects_of(base, fitted)
-        except (MjchairError, np.linalg.LinAlgError):
-            pass  # these effects this chair cannot have: linear algebra must do
+    found = next(_fits_that_hold(base, bench, reduced, options), None)
+    own: dict[ColumnId, Column] = {c: base.columns[c] for h in options[:1] for c in h.columns}
+    if found is not None:
+        here, own = found.fitted.track, effects_of(base, found.fitted)
     return noise_shown.left_by(base.bench, here, base.nuisances, own)[0], found
+
+
+def _fits_that_hold(
+    base: Base, bench: Bench, reduced: Reduced, options: Sequence[Hypothesis]
+) -> Iterator[Found]:
+    """Fits of hypotheses that bring about what linear algebra promises of them.
+
+    Effects that are nearly alike may come out large and opposed to one another by linear algebra,
+    and a chair that is so is far off.
+    """
+    for h in options:
+        if h.gain <= rules.needed(h.free):
+            continue
+        start = replace(base.around.variant, terms=hypotheses.terms(reduced, h))
+        try:
+            fitted = refit(bench, start, base.around.track, base.nuisances, ROUNDS)
+        except (MjchairError, np.linalg.LinAlgError):
+            continue  # these effects this chair cannot have
+        promised = reduced.total - h.gain
+        if not rules.fell_short(total=fitted.total, promised=promised, gain=h.gain):
+            yield Found(h.starts, fitted)
 
 
 def _reduced_anew(base: Base) -> Base:
@@ -202,11 +217,10 @@ def _reduced_anew(base: Base) -> Base:
     return replace(base, system=system, reduced=bounded.reduce(system, bench.windows))
 
 
-def _best(reduced: Reduced, starts: Sequence[Start]) -> Hypothesis | None:
-    """The best hypothesis of any size, by linear algebra; None: none brings anything."""
+def _best_of_sizes(reduced: Reduced, starts: Sequence[Start]) -> list[Hypothesis]:
+    """The best hypothesis of each size that brings anything, by linear algebra, best first."""
     firsts = (h for options in hypotheses.by_size(reduced, starts) for h in options[:1])
-    known = [h for h in firsts if h.score > 0.0]
-    return max(known, key=lambda h: h.score, default=None)
+    return sorted((h for h in firsts if h.score > 0.0), key=lambda h: -h.score)
 
 
 def _farthest(plain: Fitted) -> float:

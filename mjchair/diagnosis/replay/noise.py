@@ -85,8 +85,9 @@ def _channel(study: Study, channel: str) -> Noise:
     white = _white(values)
     least = max(sensor(channel).floor, rounding / np.sqrt(12.0))
     given = study.noise.get(channel, study.noise.get(channel.rsplit(".", 1)[0]))
-    still = _still(study, channel)
-    slow, time, source = rounding / np.sqrt(12.0), 0.3, "third differences"
+    # at rest an encoder stays on one tick, which tells nothing of a wheel that turns
+    still = None if sensor(channel).free_zero else _still(study, channel)
+    slow, time, source = rounding / np.sqrt(12.0), _held(values, step), "third differences"
     if still is not None:
         drift, rho = still
         if rho > 0.2:  # autoregressive: most of the scatter is correlated
@@ -120,6 +121,16 @@ def _lattice(values: Array) -> float:
     if levels.size < 3 or levels.size > 0.5 * values.size:
         return 0.0
     return float(np.median(np.diff(levels)))
+
+
+def _held(values: Sequence[Array], step: float) -> float:
+    """Mean time (s) for which samples `step` (s) apart keep one value.
+
+    The error of rounding stays the same for as long. In a wheel's angle that is less than a sample
+    while it rolls, in the heading of a chair that goes straight it is seconds.
+    """
+    changes = sum(np.count_nonzero(np.diff(v)) for v in values)
+    return step * sum(v.size for v in values) / max(changes, 1)
 
 
 def _still(study: Study, channel: str) -> tuple[float, float] | None:

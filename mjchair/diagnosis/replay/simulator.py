@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjchair.diagnosis.data.standstill import rolls_at
 from mjchair.diagnosis.data.study import Run, Study
 from mjchair.diagnosis.data.windows import Window, cut
 from mjchair.diagnosis.replay import strokes
@@ -66,6 +67,7 @@ class WindowSimulator:
 
     Attributes:
       study, channels, windows: what is simulated. step: of the simulation, s.
+      rolls: of every window, whether a channel shows that the chair rolls as it begins.
     """
 
     def __init__(
@@ -86,6 +88,7 @@ class WindowSimulator:
         self.chair = Chair(self.base)
         self.step = float(self.base.opt.timestep)
         self.windows = list(windows) if windows is not None else cut(study.runs, self.step)
+        self.rolls = [self._rolls(w) for w in self.windows]
         longest = max(w.last - w.start for w in self.windows)
         self.steps = int(np.ceil(longest / self.step)) + 3
         self.coarse = self._coarse_step()
@@ -93,6 +96,10 @@ class WindowSimulator:
         self.motions = [motions(run) | strokes.courses(run) for run in study.runs]
         self.carrier = StateCarrier(self.base, self.chair)
         self.studied = digest(part for run in study.runs for part in _given(run))
+
+    def _rolls(self, window: Window) -> bool:
+        trial = self.study.runs[window.run].trial
+        return bool(rolls_at(trial, np.array([window.start]))[0])
 
     def _coarse_step(self) -> float:
         """Twice the step where the tires allow it: enough for differences of two simulations."""

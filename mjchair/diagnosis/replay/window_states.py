@@ -88,7 +88,7 @@ def first_states(simulator: WindowSimulator, model: mujoco.MjModel) -> dict[int,
 def prior(simulator: WindowSimulator, window: int, state: State) -> Array:
     """Standard deviation of the slow state of a window that starts at `state`, (7,)."""
     spread = _moving_prior(simulator, window)
-    if simulator.chair.stands(state):
+    if _stands(simulator, window, state):
         spread[3:5] = STANDING
     # nothing tells where an unseen position is; what its column answers is rounding, and a large
     # residual would be laid on it
@@ -96,6 +96,11 @@ def prior(simulator: WindowSimulator, window: int, state: State) -> Array:
         1e-6
     )
     return spread
+
+
+def _stands(simulator: WindowSimulator, window: int, state: State) -> bool:
+    """Whether the chair stands as a window begins, and no channel shows that it rolls."""
+    return simulator.chair.stands(state) and not simulator.rolls[window]
 
 
 def _moving_prior(simulator: WindowSimulator, window: int) -> Array:
@@ -150,7 +155,11 @@ def track(
             going = search
             # answers that are kept from another chair would lead further rounds astray
             for round_ in range(ROUNDS + MORE):
-                going = {i: s for i, s in going.items() if _goes_on(chair, s, round_, kept)}
+                going = {
+                    i: s
+                    for i, s in going.items()
+                    if _goes_on(s, round_, kept, _stands(simulator, i, s.state))
+                }
                 if not going:
                     break
                 _fit_round(simulator, chair, (model, coarse), errors, going, white, slow, kept)
@@ -204,18 +213,18 @@ class Search:
         return True
 
 
-def _goes_on(chair: Chair, search: Search, round_: int, kept: bool) -> bool:
+def _goes_on(search: Search, round_: int, kept: bool, stands: bool) -> bool:
     """Whether a window takes part in a round; a chair at rest answers in steps, not in slopes."""
     if search.calm:
         return False
-    if chair.stands(search.state) or (kept and not search.touchy):
+    if stands or (kept and not search.touchy):
         return round_ < ROUNDS
     return search.promise > PROMISE
 
 
-def _leads_astray(chair: Chair, search: Search) -> bool:
+def _leads_astray(search: Search, stands: bool) -> bool:
     """Whether a step that failed had promised much; a chair at rest answers in steps."""
-    return search.promise > MUCH * search.size and not chair.stands(search.best)
+    return search.promise > MUCH * search.size and not stands
 
 
 def _traced(
@@ -255,7 +264,7 @@ def _fit_round(
             good.append(i)
             if s.touchy or not kept:
                 asked[i] = s.best
-        elif not s.touchy and _leads_astray(chair, s):
+        elif not s.touchy and _leads_astray(s, _stands(simulator, i, s.best)):
             s.touchy, s.state, asked[i] = True, s.best, s.best
             good.append(i)
         else:
@@ -268,7 +277,7 @@ def _fit_round(
     for i in good:
         s = search[i]
         change, s.promise = _step(simulator, i, s.state, s.predicted, slow[i], white)
-        s.calm = s.promise <= CALM and not chair.stands(s.state)
+        s.calm = s.promise <= CALM and not _stands(simulator, i, s.state)
         if s.calm:
             continue
         s.change = change * STEPS
@@ -306,14 +315,20 @@ def _answers(
 def _step(
     simulator: WindowSimulator, i: int, state: State, seen: Array, slow: Array, white: Array
 ) -> tuple[Array, float]:
-    """Linear step of a window's slow state, in units of chair.STEPS, (7,), and what it promises."""
+    """Linear step of a window's slow state, in units of chair.STEPS, (7,), and what it promises.
+
+    A chair that misses the samples by more than their noise is not right, and what it leaves tells
+    little of states that no channel sees: they would stand in for what is missing.
+    """
     miss = residual(simulator.measured(simulator.windows[i]), seen, simulator.channels)
     there = ~np.isnan(miss)
+    size = _size(simulator, simulator.windows[i], seen, white)
+    louder = max(1.0, size / max(int(there.sum()), 1))  # power of what is left, over the noise
     columns = np.concatenate([slow, zero_columns(simulator)[None].repeat(len(miss), 0)], 2)
     a = (columns / white[None, :, None])[there]
     b = (miss / white)[there]
     spread = np.r_[prior(simulator, i, state) / STEPS, np.full(columns.shape[2] - len(SLOW), 1e4)]
-    normal = a.T @ a + np.diag(1.0 / spread**2)
+    normal = a.T @ a + np.diag(louder / spread**2)
     aim, zeros = a.T @ b, slice(len(SLOW), None)
     whole = np.linalg.solve(normal, aim)
     # the zeros of wheels' angles are free wherever the state is
