@@ -50,9 +50,10 @@ Array = NDArray[np.float64]
 CAMERAS = 120.0  # Hz
 SEEN = 5e-4  # m, standard deviation of a marker
 LATE = {"left": 0.0, "right": 0.15, "markers": 0.37}  # s, by which each recording begins after left
-# N m, peak on each rim; with 16 a caster all but lifts, of which planar equations know nothing
-TORQUE = 12.0
-STANDS = 1.0  # s at rest before the first stroke of a pushed run, and more until the hands move
+# N m, peak on each rim; with more a caster all but lifts, of which planar equations know nothing
+TORQUE = 10.0
+STARTS = 0.9  # m/s, as pushed runs begin
+STANDS = 1.0  # s before the first stroke of a pushed run, and more until the hands move
 SPUN = (9.0, 20.0)  # rad/s and s: the wheel off the floor, spun once and left alone
 SLOWS = 0.15  # rad/s^2 of that wheel, assumption
 PRESSES = 0.4  # of the tangential force of a hand is radial, towards the axle; assumption
@@ -127,7 +128,7 @@ class Run:
 
 
 def runs(plan: Plan, seed: int = 0) -> list[Run]:
-    """Every run: pushes begin at rest, coasts as the hands have left the rims."""
+    """Every run: pushes begin at rest or rolling, coasts as the hands have left the rims."""
     rng = np.random.default_rng(seed)
     out = []
     for k in range(plan.pushes + plan.coasts):
@@ -399,12 +400,14 @@ def main(given: Sequence[str] | None = None) -> None:
     parser.add_argument("--rolling", type=float, default=0.005, help="rolling resistance added")
     parser.add_argument("--gain-left", type=float, default=0.0, help="of the left rim, 0.05: 1.05")
     parser.add_argument("--gain-right", type=float, default=0.0, help="of the right rim")
+    parser.add_argument("--start", type=float, default=STARTS, help="speed of pushed runs, m/s")
     parser.add_argument("--pushes", type=int, default=4)
     parser.add_argument("--coasts", type=int, default=4)
-    parser.add_argument("--diagnose", action="store_true", help="10 min and more")
+    parser.add_argument("--diagnose", action="store_true", help="some minutes")
     args = parser.parse_args(given)
     hidden = Hidden(args.rolling, gain_left=args.gain_left, gain_right=args.gain_right)
-    plan = Plan(Person(mass=args.mass, torque=TORQUE), hidden, args.pushes, args.coasts)
+    person = Person(mass=args.mass, torque=TORQUE)
+    plan = Plan(person, hidden, args.pushes, args.coasts, start=args.start)
     raw, study, truth = (args.out / name for name in ("raw", "study", "truth"))
     every = write(plan, raw, truth, args.seed)
     print(f"hidden: {hidden}; {plan.person}; clocks, s: {LATE}; kept in {truth}")

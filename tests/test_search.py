@@ -332,6 +332,44 @@ def test_a_single_effect_may_be_what_the_search_for_noise_left_over(fits, monkey
     assert best.hypothesis.keys == ("motor",) and best.fitted is motor and not left.exists
 
 
+@pytest.mark.parametrize("closes", [True, False])
+def test_effects_left_over_while_the_noise_was_sought_come_before_pairs(fits, monkeypatch, closes):
+    """Where one effect leaves a gap and these leave none, no pair is built on the single effect.
+
+    On a person who pushes, singles and pairs took minutes before the right three were looked at.
+    """
+    rolling, together = fit(1500.0, "rolling"), fit(1110.0, "motor", "wind")
+    fits.answers.update(
+        {
+            ("rolling", "as given"): rolling,
+            ("rolling", "track of rolling"): rolling,
+            ("motor+wind", "track of motor+wind"): together,
+        }
+    )
+    monkeypatch.setattr(
+        hypotheses, "weigh", lambda _, starts: Hypothesis(tuple(starts), 870.0, 850.0)
+    )
+    monkeypatch.setattr(hypotheses, "singles", lambda *_: [ONE])
+    monkeypatch.setattr(shortlist, "_commonest", lambda _, options: options[0])
+    believe(monkeypatch, lambda _: True)
+    monkeypatch.setattr(forward_selection, "is_worth", lambda *_: True)
+    monkeypatch.setattr(
+        fits_of_hypotheses,
+        "gap_after",
+        lambda _, f: SimpleNamespace(exists=f is not together or not closes),
+    )
+    further = mock.Mock(return_value=None)
+    monkeypatch.setattr(forward_selection, "further", further)
+    looking = searching()
+    looking.base.starts = ()
+    best = fit(1105.0, "motor", "wind")
+    best.sigmas = {"motor": 30.0, "wind": 20.0}
+    looking.base.best = SimpleNamespace(starts=(MOTOR, WIND), fitted=best)
+    here = forward_selection.grown(looking)
+    assert further.called != closes
+    assert not closes or here[0].hypothesis.keys == ("motor", "wind")
+
+
 @pytest.mark.parametrize(("beside", "pair"), [(1600.0, True), (1150.0, True), (1050.0, False)])
 def test_a_pair_that_was_fitted_while_the_noise_was_sought_may_be_the_better_one(
     fits, monkeypatch, beside, pair
