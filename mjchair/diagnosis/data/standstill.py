@@ -58,9 +58,9 @@ def rests(trial: Trial) -> list[tuple[float, float]]:
         for a, b in out.items()
         if time[a] - time[0] > ROLLS
     ]
-    begins = rolls_on(trial)
-    later = [(a, b) for a, b in stops if a > begins]
-    return later if begins == time[0] else [(float(time[0]), begins), *later]
+    onward = rolls_on(trial)
+    later = [(a, b) for a, b in stops if a > onward]
+    return later if onward == time[0] else [(float(time[0]), onward), *later]
 
 
 def rolls_on(trial: Trial) -> float:
