@@ -6,6 +6,7 @@ import pytest
 
 from mjchair.diagnosis.explain import screening
 from mjchair.diagnosis.explain.screening import LOUD, QUIETER
+from mjchair.errors import MjchairError
 
 
 def taken(monkeypatch, first, other):
@@ -45,3 +46,50 @@ def test_an_explanation_that_leaves_far_less_noise_is_taken(
     monkeypatch, first, other, power, looks
 ):
     assert taken(monkeypatch, first, other) == (power, looks)
+
+
+def told(total, promised=None, bound=(), offset=0.0):
+    """A fit by its numbers."""
+    return SimpleNamespace(
+        total=total,
+        promised=total if promised is None else promised,
+        at_bound=bound,
+        variant=SimpleNamespace(offsets={"mass": offset}),
+    )
+
+
+@pytest.mark.parametrize(
+    ("fits", "best"),
+    [
+        ([told(300.0), told(100.0)], 0),  # the first holds: no other is fitted
+        ([told(900.0, promised=300.0), told(310.0)], 1),  # it promises far more than it brings
+        ([told(300.0, bound=("angle",)), told(310.0)], 1),  # a size no chair can have
+        ([told(300.0, offset=-3.0), told(310.0)], 1),  # the mass went to its wall for it
+        ([told(900_000.0), told(310.0)], 1),  # linear algebra promised what it does not bring
+        ([MjchairError("no chair"), told(310.0)], 1),
+        ([told(350.0, offset=3.0), told(310.0, offset=3.0)], 1),  # none holds: the better one
+        ([MjchairError("no chair"), MjchairError("no chair")], None),
+    ],
+)
+def test_the_noise_is_taken_around_an_explanation_that_holds(monkeypatch, fits, best):
+    """Camber of -0.3 rad, and a mass at its wall, stood in for two rims of different gain."""
+    answers = iter(fits)
+
+    def refit(*_):
+        answer = next(answers)
+        if isinstance(answer, MjchairError):
+            raise answer
+        return answer
+
+    monkeypatch.setattr(screening, "refit", refit)
+    monkeypatch.setattr(screening.hypotheses, "terms", lambda *_: ())
+    monkeypatch.setattr(screening, "replace", lambda variant, **_: variant)
+    options = [
+        SimpleNamespace(starts=(k,), gain=1e6, score=1e6, free=1, prior=0.0)
+        for k in range(len(fits))
+    ]
+    around = SimpleNamespace(variant=None, track=None)
+    base = SimpleNamespace(around=around, nuisances={})
+    reduced = SimpleNamespace(total=1_000_300.0)
+    found = screening._first_that_holds(base, None, reduced, options)
+    assert (found and found.starts) == (None if best is None else (best,))

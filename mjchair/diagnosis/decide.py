@@ -97,7 +97,11 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         drivers=left,
         nearest=_nearest(base, choice, closed) if choice and said == Verdict.UNKNOWN else None,
         probability=probability,
-        more_missing=bool(named and stands and rules.more_missing(stands, len(_walls(named)))),
+        more_missing=bool(
+            named
+            and stands
+            and rules.more_missing(stands, len(bounded.at_walls(named.fitted.variant.offsets)))
+        ),
         material=size,
         process=_process(base),
         terms=named.fitted.variant.terms if named else (),
@@ -147,12 +151,6 @@ def _once(base: Base, choice: Choice, held: rules.HeldOut | None) -> bool:
     """Whether something that happened once, in one run, fits about as well as the effects do."""
     largest = event.largest(base)
     return rules.happened_once(event=largest, gain=choice.hypothesis.gain, held=held)
-
-
-def _walls(choice: Choice) -> list[str]:
-    """What is only roughly known and stands on its wall: pushed there by what is missing."""
-    offsets = choice.fitted.variant.offsets
-    return [name for name, by in offsets.items() if abs(by) > bounded.WALL - 1e-6]
 
 
 def _process(base: Base) -> dict[str, Estimate]:
@@ -351,7 +349,7 @@ def _notes(
     notes += [
         f"{name} stands at {bounded.WALL:g} standard deviations from what the study says of it: "
         "something is missing there, or the study is wrong about it"
-        for name in (_walls(choice) if choice else [])
+        for name in (bounded.at_walls(choice.fitted.variant.offsets) if choice else [])
     ]
     if choice is not None and said in (Verdict.NAMED, Verdict.AMBIGUOUS):
         said_of = (_remark(choice.fitted, term) for term in choice.fitted.variant.terms)

@@ -128,7 +128,7 @@ class MultiStart:
             return None
         if self._is_behind(fitted):
             pass  # what it would gain if all were made anew decides nothing
-        elif _walled(fitted):
+        elif bounded.at_walls(fitted.variant.offsets):
             fitted = self._around_terms(fitted)
         elif rules.is_stuck(total=fitted.total, promised=fitted.promised):
             fitted = made_anew(self.base.bench, fitted.variant, fitted.track) or fitted
@@ -199,8 +199,3 @@ def _smaller(term: Term) -> Term:
         if p.sized
     }
     return replace(term, values={**term.values, **values})
-
-
-def _walled(fitted: Fitted) -> bool:
-    """Whether anything that is only roughly known stands on its wall."""
-    return any(abs(by) >= bounded.WALL for by in fitted.variant.offsets.values())

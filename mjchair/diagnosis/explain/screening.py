@@ -5,7 +5,7 @@ In: a study and effects. Out: a `Base`, on which everything after it rests.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,6 +43,7 @@ FAR = 2.5  # prior standard deviations: a nuisance there is not what moved
 LOUD = 0.01  # share of the power that may shake a chair: below it noise hides nothing
 QUIETER = 0.25  # of the power of what shakes the chair: an explanation that leaves less is right
 ROUNDS = 4  # of the fit of what may be no noise: where it is right they are enough
+TRIED, OF_A_SIZE = 6, 3  # hypotheses, and of one size, that are fitted until one holds
 AT_REST = 0.01  # m/s^2, bias of an accelerometer that was seen at rest
 
 
@@ -181,22 +182,24 @@ def _noise_left(base: Base, bench: Bench, reduced: Reduced) -> tuple[Bench, Foun
     """
     options = _best_of_sizes(reduced, base.starts)
     here = base.around.track
-    found = next(_fits_that_hold(base, bench, reduced, options), None)
+    found = _first_that_holds(base, bench, reduced, options)
     own: dict[ColumnId, Column] = {c: base.columns[c] for h in options[:1] for c in h.columns}
     if found is not None:
         here, own = found.fitted.track, effects_of(base, found.fitted)
     return noise_shown.left_by(base.bench, here, base.nuisances, own)[0], found
 
 
-def _fits_that_hold(
+def _first_that_holds(
     base: Base, bench: Bench, reduced: Reduced, options: Sequence[Hypothesis]
-) -> Iterator[Found]:
-    """Fits of hypotheses that bring about what linear algebra promises of them.
+) -> Found | None:
+    """The fit of the first hypothesis that holds, or the best fit; None: no chair can be so.
 
-    Effects that are nearly alike may come out large and opposed to one another by linear algebra,
-    and a chair that is so is far off.
+    It holds where it brings about what linear algebra promises of it, and pushes nothing to where
+    it cannot be. Effects that are nearly alike may come out large and opposed to one another by
+    linear algebra, and where one effect of several is missing, others go to their ends for it.
     """
-    for h in options:
+    made = []
+    for h in options[:TRIED]:
         if h.gain <= rules.needed(h.free):
             continue
         start = replace(base.around.variant, terms=hypotheses.terms(reduced, h))
@@ -204,9 +207,13 @@ def _fits_that_hold(
             fitted = refit(bench, start, base.around.track, base.nuisances, ROUNDS)
         except (MjchairError, np.linalg.LinAlgError):
             continue  # these effects this chair cannot have
-        promised = reduced.total - h.gain
-        if not rules.fell_short(total=fitted.total, promised=promised, gain=h.gain):
-            yield Found(h.starts, fitted)
+        found = Found(h.starts, fitted)
+        short = rules.fell_short(total=fitted.total, promised=reduced.total - h.gain, gain=h.gain)
+        short |= rules.is_stuck(total=fitted.total, promised=fitted.promised)
+        if not short and not fitted.at_bound and not bounded.at_walls(fitted.variant.offsets):
+            return found
+        made.append((fitted.total + rules.PENALTY * h.free - h.prior, found))
+    return min(made, key=lambda m: m[0])[1] if made else None
 
 
 def _reduced_anew(base: Base) -> Base:
@@ -218,8 +225,8 @@ def _reduced_anew(base: Base) -> Base:
 
 
 def _best_of_sizes(reduced: Reduced, starts: Sequence[Start]) -> list[Hypothesis]:
-    """The best hypothesis of each size that brings anything, by linear algebra, best first."""
-    firsts = (h for options in hypotheses.by_size(reduced, starts) for h in options[:1])
+    """The best hypotheses of each size that bring anything, by linear algebra, best first."""
+    firsts = (h for options in hypotheses.by_size(reduced, starts) for h in options[:OF_A_SIZE])
     return sorted((h for h in firsts if h.score > 0.0), key=lambda h: -h.score)
 
 

@@ -9,7 +9,7 @@ it. What is left (`Reduced`) weighs effects by small linear algebra alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from weakref import WeakKeyDictionary
@@ -193,6 +193,15 @@ class Sums:
     def plain(self) -> Reduced:
         """The elimination that is right where no column is put in."""
         return self.eliminated(())._settled([])[0]
+
+
+def at_walls(offsets: Mapping[str, float]) -> list[str]:
+    """Names of what is only roughly known and stands on its wall, pushed there by what is missing.
+
+    Args:
+      offsets: name -> by how many standard deviations it was moved.
+    """
+    return [name for name, by in offsets.items() if abs(by) > WALL - 1e-6]
 
 
 def scaled_solve(G: Array, b: Array) -> Array:
