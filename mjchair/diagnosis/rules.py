@@ -401,6 +401,11 @@ def is_stuck(*, total: float, promised: float) -> bool:
     return total - promised > RIVAL_CHI2
 
 
+def has_settled(*, total: float, promised: float) -> bool:
+    """Whether a fit is, but for a small share of what it leaves, where its own step leads."""
+    return total - promised <= max(RIVAL_CHI2, SHORT * total)
+
+
 def columns_hold(*, gain: float, missed: float) -> bool:
     """Whether columns that were made around a chair without effects are as good as new ones.
 

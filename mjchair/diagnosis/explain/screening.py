@@ -209,8 +209,8 @@ def _first_that_holds(
             continue  # these effects this chair cannot have
         found = Found(h.starts, fitted)
         short = rules.fell_short(total=fitted.total, promised=reduced.total - h.gain, gain=h.gain)
-        short |= rules.is_stuck(total=fitted.total, promised=fitted.promised)
-        if not short and not fitted.at_bound and not bounded.at_walls(fitted.variant.offsets):
+        settled = rules.has_settled(total=fitted.total, promised=fitted.promised) and not short
+        if settled and not fitted.at_bound and not bounded.at_walls(fitted.variant.offsets):
             return found
         made.append((fitted.total + rules.PENALTY * h.free - h.prior, found))
     return min(made, key=lambda m: m[0])[1] if made else None
