@@ -303,6 +303,26 @@ def test_a_second_effect_is_weighed_around_the_fit_of_the_first(fits, monkeypatc
     assert not left.exists and looking.near is None
 
 
+def rolling_alone_first(monkeypatch, closes):
+    """Fits of which rolling resistance is the best single one.
+
+    Args:
+      closes: the fit that leaves no gap; None: all leave one.
+    """
+    monkeypatch.setattr(
+        hypotheses, "weigh", lambda _, starts: Hypothesis(tuple(starts), 870.0, 850.0)
+    )
+    monkeypatch.setattr(hypotheses, "singles", lambda *_: [ONE])
+    monkeypatch.setattr(shortlist, "_commonest", lambda _, options: options[0])
+    believe(monkeypatch, lambda _: True)
+    monkeypatch.setattr(
+        fits_of_hypotheses, "gap_after", lambda _, f: SimpleNamespace(exists=f is not closes)
+    )
+    looking = searching()
+    looking.base.starts = ()
+    return looking
+
+
 def test_a_single_effect_may_be_what_the_search_for_noise_left_over(fits, monkeypatch):
     """By linear algebra rolling resistance is best; beside it a motor ended as the only one."""
     motor = fit(1110.0, "motor")
@@ -314,17 +334,7 @@ def test_a_single_effect_may_be_what_the_search_for_noise_left_over(fits, monkey
             ("motor", "track of motor"): motor,
         }
     )
-    monkeypatch.setattr(
-        hypotheses, "weigh", lambda _, starts: Hypothesis(tuple(starts), 870.0, 850.0)
-    )
-    monkeypatch.setattr(hypotheses, "singles", lambda *_: [ONE])
-    monkeypatch.setattr(shortlist, "_commonest", lambda _, options: options[0])
-    believe(monkeypatch, lambda _: True)
-    monkeypatch.setattr(
-        fits_of_hypotheses, "gap_after", lambda _, f: SimpleNamespace(exists=f is not motor)
-    )
-    looking = searching()
-    looking.base.starts = ()
+    looking = rolling_alone_first(monkeypatch, closes=motor)
     both = fit(1105.0, "rolling", "motor")
     both.sigmas = {"rolling": 0.5, "motor": 30.0}
     looking.base.best = SimpleNamespace(starts=(ROLLING, MOTOR), fitted=both)
@@ -346,22 +356,10 @@ def test_effects_left_over_while_the_noise_was_sought_come_before_pairs(fits, mo
             ("motor+wind", "track of motor+wind"): together,
         }
     )
-    monkeypatch.setattr(
-        hypotheses, "weigh", lambda _, starts: Hypothesis(tuple(starts), 870.0, 850.0)
-    )
-    monkeypatch.setattr(hypotheses, "singles", lambda *_: [ONE])
-    monkeypatch.setattr(shortlist, "_commonest", lambda _, options: options[0])
-    believe(monkeypatch, lambda _: True)
     monkeypatch.setattr(forward_selection, "is_worth", lambda *_: True)
-    monkeypatch.setattr(
-        fits_of_hypotheses,
-        "gap_after",
-        lambda _, f: SimpleNamespace(exists=f is not together or not closes),
-    )
     further = mock.Mock(return_value=None)
     monkeypatch.setattr(forward_selection, "further", further)
-    looking = searching()
-    looking.base.starts = ()
+    looking = rolling_alone_first(monkeypatch, closes=together if closes else None)
     best = fit(1105.0, "motor", "wind")
     best.sigmas = {"motor": 30.0, "wind": 20.0}
     looking.base.best = SimpleNamespace(starts=(MOTOR, WIND), fitted=best)
