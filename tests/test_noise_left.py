@@ -85,7 +85,7 @@ def test_the_noise_is_taken_around_an_explanation_that_holds(monkeypatch, fits, 
     monkeypatch.setattr(screening.hypotheses, "terms", lambda *_: ())
     monkeypatch.setattr(screening, "replace", lambda variant, **_: variant)
     options = [
-        SimpleNamespace(starts=(k,), gain=1e6, score=1e6, free=1, prior=0.0)
+        SimpleNamespace(starts=(k,), gain=1e6, score=1e6, free=1, penalty=10.0)
         for k in range(len(fits))
     ]
     around = SimpleNamespace(variant=None, track=None)

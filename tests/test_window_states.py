@@ -25,7 +25,10 @@ def step(monkeypatch):
         simulator = SimpleNamespace(
             channels=CHANNELS, windows=[None], measured=lambda _: miss, chair=None
         )
-        return window_states._step(simulator, 0, None, np.zeros((50, 2)), slow, WHITE)
+        seen = np.zeros((50, 2))
+        size = window_states._size(simulator, None, seen, WHITE)
+        search = window_states.Search(None, None, size, predicted=seen)
+        return window_states._step(simulator, 0, search, slow, WHITE)
 
     return promised
 

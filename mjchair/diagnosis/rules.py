@@ -84,6 +84,26 @@ class HeldOut:
     dof: float
     changed: float
 
+    @property
+    def gap(self) -> float:
+        """Excess of chi2 before."""
+        return self.before - self.dof
+
+    @property
+    def left(self) -> float:
+        """Excess of chi2 after."""
+        return self.after - self.dof
+
+    @property
+    def scatter(self) -> float:
+        """Chi2 by which noise alone may be off."""
+        return _scatter(self.dof)
+
+    @property
+    def shown(self) -> bool:
+        """Whether a gap shows, and the effects change it."""
+        return min(self.gap, self.changed) > self.scatter
+
 
 @dataclass(frozen=True, kw_only=True)
 class Standing:
@@ -167,29 +187,24 @@ def carries_over(held: HeldOut) -> bool:
     Effects that change next to nothing there, as a gyroscope's gain where nothing turns, have no
     part in a gap of another cause.
     """
-    scatter = _scatter(held.dof)
-    gap, left = held.before - held.dof, held.after - held.dof
-    if min(gap, held.changed) <= scatter:
-        return left < gap + scatter
-    return left < max(gap - CARRIED * min(gap, held.changed), scatter)
+    if not held.shown:
+        return not opens_a_gap(held)
+    return held.left < max(held.gap - CARRIED * min(held.gap, held.changed), held.scatter)
 
 
 def opens_a_gap(held: HeldOut) -> bool:
-    """Whether the effects are worse than nothing on held-out trials, beyond the scatter of noise.
+    """Whether the effects are no better than nothing on held-out trials.
 
-    Where a gap shows that they change, they must bring something. What brings less than
-    `carries_over` asks is an answer beside which more is missing.
+    Where a gap shows that they change, they must bring something; where none does, none may open
+    beyond the scatter of noise. What brings less than `carries_over` asks is an answer beside which
+    more is missing.
     """
-    scatter = _scatter(held.dof)
-    gap, left = held.before - held.dof, held.after - held.dof
-    shown = min(gap, held.changed) > scatter
-    return left >= (gap if shown else gap + scatter)
+    return held.left >= (held.gap if held.shown else held.gap + held.scatter)
 
 
 def shows_again(held: HeldOut) -> bool:
     """Whether held-out trials, which no fit has seen, show what the effects explain."""
-    shown = min(held.before - held.dof, held.changed) > _scatter(held.dof)
-    return shown and carries_over(held)
+    return held.shown and carries_over(held)
 
 
 def foretells_wrongly(chi2: float, dof: float) -> bool:

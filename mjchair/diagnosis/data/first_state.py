@@ -169,10 +169,9 @@ def _yaw_rate(run: Run, axle: RearAxle) -> float:
     gyro = _first(run, "imu_gyro.z")
     if gyro is not None:
         return gyro[0]
-    for kind in KINDS:
+    for line, kind in enumerate(KINDS):  # the value of a speed, the slope of an angle
         left, right = (_first(run, f"{side}_wheel_{kind}") for side in SIDES)
         if left is not None and right is not None:
-            order = KINDS.index(kind)  # of the derivative that is a speed
-            return (right[order] * axle.right - left[order] * axle.left) / axle.track
+            return (right[line] * axle.right - left[line] * axle.left) / axle.track
     heading = _first(run, "heading")
     return heading[1] if heading is not None else 0.0

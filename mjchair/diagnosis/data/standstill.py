@@ -1,4 +1,4 @@
-"""Where a measured chair stands, where it comes to rest, and where it dithers before it rolls.
+"""Where a measured chair stands, comes to rest, or is pushed to and fro before it rolls on.
 
 In: a run. Out: stretches of its samples in which the chair stands, and the times, around each stop
 and before a start that is not clean, that no fit uses. Whatever tells the speed is used: wheel
@@ -9,7 +9,7 @@ chair to chair.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +37,7 @@ def still_stretches(trial: Trial, shortest: float = STANDS) -> list[tuple[int, i
     Args:
       shortest: such stretch, s. A run of which no channel tells its speed has none.
     """
-    time = trial.time
-    return [(a, b) for a, b in _stretches(_slower(trial)) if time[b - 1] - time[a] > shortest]
+    return _longer(trial.time, _stretches(_slower(_speeds(trial))), shortest)
 
 
 def rests(trial: Trial) -> list[tuple[float, float]]:
@@ -47,9 +46,14 @@ def rests(trial: Trial) -> list[tuple[float, float]]:
     A run that begins at rest does not come to rest there, but a person who moves on a chair at rest
     may push it to and fro until it rolls on.
     """
-    time, slow, rocking = trial.time, _slower(trial), _stretches(_slower(trial, ROCKING))
+    time, speeds = trial.time, _speeds(trial)
+    slow, rocking = _slower(speeds), _stretches(_slower(speeds, ROCKING))
+    still = _stretches(slow)
+    stands = _longer(time, still, STANDS)
+    if still and still[-1][1] == time.size:
+        stands += [s for s in _longer(time, still[-1:], STANDS_AT_END) if s not in stands]
     out: dict[int, int] = {}
-    for first, after in _stands(trial, slow):
+    for first, after in stands:
         # it first stood where it began to rock
         begins = max(a for a, b in rocking if a <= first < b)
         out[begins + int(np.argmax(slow[begins:]))] = after
@@ -58,65 +62,61 @@ def rests(trial: Trial) -> list[tuple[float, float]]:
         for a, b in out.items()
         if time[a] - time[0] > ROLLS
     ]
-    onward = rolls_on(trial)
+    onward = _rolls_on(time, still)
     later = [(a, b) for a, b in stops if a > onward]
     return later if onward == time[0] else [(float(time[0]), onward), *later]
 
 
-def rolls_on(trial: Trial) -> float:
+def rolls_at(trial: Trial, times: Array) -> NDArray[np.bool_]:
+    """Whether a channel shows at each of the times (n,), s, that the chair rolls."""
+    speeds = _speeds(trial)
+    at = np.clip(np.searchsorted(trial.time, times), 0, trial.time.size - 1)
+    return np.asarray(~_slower(speeds)[at] if speeds else np.zeros(at.size, bool))
+
+
+def _rolls_on(time: Array, still: Sequence[tuple[int, int]]) -> float:
     """When (s) a chair that dithers at first rolls on for good; the first time where none does.
 
     A chair that stands at first, and leaves its place once, does not dither.
+
+    Args:
+      still: stretches in which it is slow, however short.
     """
-    time, slow = trial.time, _stretches(_slower(trial))
-    if not slow or slow[0][0] > 0:
-        return float(time[0])
-    follows = [*(time[a] for a, _ in slow[1:]), time[-1]]
-    for k, ((_, after), then) in enumerate(zip(slow, follows, strict=True)):
-        if after < time.size and then - time[after] > ROLLS:
-            return float(time[after] if k > 0 else time[0])
+    if still and still[0][0] == 0:
+        follows = [*(time[a] for a, _ in still[1:]), time[-1]]
+        for k, ((_, after), then) in enumerate(zip(still, follows, strict=True)):
+            if after < time.size and then - time[after] > ROLLS:
+                return float(time[after] if k > 0 else time[0])
     return float(time[0])
 
 
-def rolls_at(trial: Trial, times: Array) -> NDArray[np.bool_]:
-    """Whether a channel shows at each of the times (n,), s, that the chair rolls."""
-    rolls = np.zeros(trial.time.size, bool)
-    for speed, least in _speeds(trial):
-        rolls |= speed > least
-    at = np.clip(np.searchsorted(trial.time, times), 0, trial.time.size - 1)
-    return np.asarray(rolls[at])
+def _longer(
+    time: Array, stretches: Sequence[tuple[int, int]], shortest: float
+) -> list[tuple[int, int]]:
+    """The stretches that last longer than `shortest`, s."""
+    return [(a, b) for a, b in stretches if time[b - 1] - time[a] > shortest]
 
 
-def _stands(trial: Trial, slow: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """The stretches in which the chair stands; as the run ends, a short one does."""
-    time = trial.time
-    last = [(a, b) for a, b in _stretches(slow)[-1:] if b == time.size]
-    ends = [(a, b) for a, b in last if time[-1] - time[a] > STANDS_AT_END]
-    return [*dict.fromkeys([*still_stretches(trial), *ends])]
-
-
-def _slower(trial: Trial, factor: float = 1.0) -> NDArray[np.bool_]:
+def _slower(speeds: Sequence[tuple[Array, float]], factor: float = 1.0) -> NDArray[np.bool_]:
     """Which samples are slower than `factor` times what stands; none if no channel tells."""
-    speeds = list(_speeds(trial))
-    slow = np.full(trial.time.size, bool(speeds))
-    for speed, least in speeds:
-        slow &= speed <= factor * least
-    return slow
+    every = [speed <= factor * least for speed, least in speeds]
+    return np.asarray(np.logical_and.reduce(every)) if every else np.zeros(0, bool)
 
 
-def _speeds(trial: Trial) -> Iterator[tuple[Array, float]]:
+def _speeds(trial: Trial) -> list[tuple[Array, float]]:
     """Averaged sizes of speeds (n,), each with that below which it stands, rad/s or m/s."""
-    known = set(trial.channels)
+    known, out = set(trial.channels), []
     for side in ("left", "right"):
         if f"{side}_wheel_speed" in known:
-            yield np.abs(_averaged(trial, _filled(trial, f"{side}_wheel_speed"), SPAN)), WHEEL
+            out.append((np.abs(_averaged(trial, f"{side}_wheel_speed")), WHEEL))
         elif f"{side}_wheel_angle" in known:
-            yield np.abs(_slope(trial, f"{side}_wheel_angle", SPAN)), WHEEL
+            out.append((np.abs(_slope(trial, f"{side}_wheel_angle", SPAN)), WHEEL))
     if "velocity.x" in known:
-        yield np.abs(_averaged(trial, _filled(trial, "velocity.x"), SPAN)), CHAIR
-    elif not any("_wheel_" in name for name in known) and {"position.x", "position.y"} <= known:
+        out.append((np.abs(_averaged(trial, "velocity.x")), CHAIR))
+    elif not out and {"position.x", "position.y"} <= known:
         forward, left = (_slope(trial, f"position.{axis}", SPAN_OF_PLACES) for axis in "xy")
-        yield np.hypot(forward, left), CHAIR
+        out.append((np.hypot(forward, left), CHAIR))
+    return out
 
 
 def _filled(trial: Trial, channel: str) -> Array:
@@ -132,10 +132,10 @@ def _slope(trial: Trial, channel: str, span: float) -> Array:
     return np.asarray(risen / np.maximum(end - begin, 1e-9))
 
 
-def _averaged(trial: Trial, values: Array, span: float) -> Array:
-    """Values (n,) averaged over `span` (s) around each sample."""
-    width = max(3, int(span / max(float(np.median(np.diff(trial.time))), 1e-4)))
-    return np.asarray(uniform_filter1d(values, width, mode="nearest"))
+def _averaged(trial: Trial, channel: str) -> Array:
+    """A channel averaged over SPAN around each sample, (n,)."""
+    width = max(3, int(SPAN / max(float(np.median(np.diff(trial.time))), 1e-4)))
+    return np.asarray(uniform_filter1d(_filled(trial, channel), width, mode="nearest"))
 
 
 def _stretches(held: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -27,8 +27,7 @@ class Tried:
     @property
     def price(self) -> float:
         """Chi2 with the penalty of the parameters, less for effects that are common."""
-        penalty = rules.PENALTY * self.hypothesis.free - self.hypothesis.prior
-        return self.fitted.total + penalty
+        return self.fitted.total + self.hypothesis.penalty
 
 
 @dataclass(kw_only=True)

@@ -58,6 +58,11 @@ class Hypothesis:
         return 2.0 * sum(math.log(s.effect.common) for s in self.starts)
 
     @property
+    def penalty(self) -> float:
+        """Chi2 that the parameters cost, less for effects that are common."""
+        return PENALTY * self.free - self.prior
+
+    @property
     def free(self) -> int:
         """Number of free parameters."""
         return sum(len(s.free) for s in self.starts)

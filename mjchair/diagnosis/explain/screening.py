@@ -209,10 +209,11 @@ def _first_that_holds(
             continue  # these effects this chair cannot have
         found = Found(h.starts, fitted)
         short = rules.fell_short(total=fitted.total, promised=reduced.total - h.gain, gain=h.gain)
-        settled = rules.has_settled(total=fitted.total, promised=fitted.promised) and not short
-        if settled and not fitted.at_bound and not bounded.at_walls(fitted.variant.offsets):
+        settled = rules.has_settled(total=fitted.total, promised=fitted.promised)
+        pushed = fitted.at_bound or bounded.at_walls(fitted.variant.offsets)
+        if settled and not short and not pushed:
             return found
-        made.append((fitted.total + rules.PENALTY * h.free - h.prior, found))
+        made.append((fitted.total + h.penalty, found))
     return min(made, key=lambda m: m[0])[1] if made else None
 
 

@@ -88,7 +88,7 @@ class WindowSimulator:
         self.chair = Chair(self.base)
         self.step = float(self.base.opt.timestep)
         self.windows = list(windows) if windows is not None else cut(study.runs, self.step)
-        self.rolls = [self._rolls(w) for w in self.windows]
+        self.rolls = self._rolling()
         longest = max(w.last - w.start for w in self.windows)
         self.steps = int(np.ceil(longest / self.step)) + 3
         self.coarse = self._coarse_step()
@@ -97,9 +97,14 @@ class WindowSimulator:
         self.carrier = StateCarrier(self.base, self.chair)
         self.studied = digest(part for run in study.runs for part in _given(run))
 
-    def _rolls(self, window: Window) -> bool:
-        trial = self.study.runs[window.run].trial
-        return bool(rolls_at(trial, np.array([window.start]))[0])
+    def _rolling(self) -> list[bool]:
+        out = [False] * len(self.windows)
+        for i, run in enumerate(self.study.runs):
+            mine = [k for k, w in enumerate(self.windows) if w.run == i]
+            shown = rolls_at(run.trial, np.array([self.windows[k].start for k in mine]))
+            for k, rolls in zip(mine, shown, strict=True):
+                out[k] = bool(rolls)
+        return out
 
     def _coarse_step(self) -> float:
         """Twice the step where the tires allow it: enough for differences of two simulations."""

@@ -276,7 +276,7 @@ def _fit_round(
             slow[i] = answers
     for i in good:
         s = search[i]
-        change, s.promise = _step(simulator, i, s.state, s.predicted, slow[i], white)
+        change, s.promise = _step(simulator, i, s, slow[i], white)
         s.calm = s.promise <= CALM and not _stands(simulator, i, s.state)
         if s.calm:
             continue
@@ -313,21 +313,24 @@ def _answers(
 
 
 def _step(
-    simulator: WindowSimulator, i: int, state: State, seen: Array, slow: Array, white: Array
+    simulator: WindowSimulator, i: int, search: Search, slow: Array, white: Array
 ) -> tuple[Array, float]:
     """Linear step of a window's slow state, in units of chair.STEPS, (7,), and what it promises.
 
     A chair that misses the samples by more than their noise is not right, and what it leaves tells
     little of states that no channel sees: they would stand in for what is missing.
     """
-    miss = residual(simulator.measured(simulator.windows[i]), seen, simulator.channels)
+    miss = residual(simulator.measured(simulator.windows[i]), search.predicted, simulator.channels)
     there = ~np.isnan(miss)
-    size = _size(simulator, simulator.windows[i], seen, white)
-    louder = max(1.0, size / max(int(there.sum()), 1))  # power of what is left, over the noise
+    louder = max(
+        1.0, search.size / max(int(there.sum()), 1)
+    )  # power of what is left, over the noise
     columns = np.concatenate([slow, zero_columns(simulator)[None].repeat(len(miss), 0)], 2)
     a = (columns / white[None, :, None])[there]
     b = (miss / white)[there]
-    spread = np.r_[prior(simulator, i, state) / STEPS, np.full(columns.shape[2] - len(SLOW), 1e4)]
+    spread = np.r_[
+        prior(simulator, i, search.state) / STEPS, np.full(columns.shape[2] - len(SLOW), 1e4)
+    ]
     normal = a.T @ a + np.diag(louder / spread**2)
     aim, zeros = a.T @ b, slice(len(SLOW), None)
     whole = np.linalg.solve(normal, aim)
