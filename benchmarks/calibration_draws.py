@@ -1,10 +1,10 @@
 """Cheap studies for the calibration: data drawn from the columns of base studies.
 
 What it does: takes the white columns of each base study (`calibration_studies.py`), hides nothing,
-an effect, two, or a force that no effect makes in them, adds noise of other levels and colours than
-those assumed, errors of form, and what a chair is a little other in; then runs the diagnosis' own
-selection and weights on these data, with linear algebra in place of simulations. In: the folder of
-the pickles. Out: a line for each drawn study in draws.jsonl there.
+one to three effects, or a force that no effect makes in them, adds noise of other levels and
+colours than those assumed, errors of form, and what a chair is a little other in; then runs the
+diagnosis' own selection and weights on these data, with linear algebra in place of simulations. In:
+the folder of the pickles. Out: a line for each drawn study in draws.jsonl there.
 
     python benchmarks/calibration_draws.py out/calibration --count 200
 """
@@ -42,6 +42,7 @@ from mjchair.diagnosis.explain.probability import (
     OUTSIDE,
     PRIOR_NONE,
     PRIOR_OUTSIDE,
+    PRIOR_THREE,
     PRIOR_TWO,
     least_certain,
     weights,
@@ -224,14 +225,14 @@ def _fitted(bed: Bed, windows: Sequence[Array]) -> list[Array]:
 def _hidden(bed: Bed, rng: np.random.Generator, planar: bool) -> tuple[Truth, list[Array]]:
     nothing = [np.zeros(len(b.J)) for b in bed.blocks]
     kind = rng.random()
-    sizes = np.exp(rng.uniform(*np.log(SIGMAS), size=2))
+    sizes = np.exp(rng.uniform(*np.log(SIGMAS), size=3))
     if kind < PRIOR_NONE:
         return Truth((), ()), nothing
     if kind < PRIOR_NONE + PRIOR_OUTSIDE:
         force = _planar_signal(bed, OUTSIDE, 1.0, rng) if planar else bed.strange_force(rng)
         if force is not None:
             return Truth((OUTSIDE,), (sizes[0],)), [sizes[0] * f for f in force]
-    count = 2 if kind > 1.0 - PRIOR_TWO else 1
+    count = 1 + int(kind > 1.0 - PRIOR_TWO - PRIOR_THREE) + int(kind > 1.0 - PRIOR_THREE)
     keys: list[str] = []
     while len(keys) < count:
         key, more = (_any_planar if planar else _any_effect)(bed, sizes[len(keys)], rng)

@@ -73,12 +73,12 @@ def base(size, alike=0.0, force=0.0):
     return SimpleNamespace(reduced=reduced, starts=starts, plain=plain)
 
 
-def fit(known, one):
-    """One effect with its fit."""
-    hypothesis = hypotheses.weigh(known.reduced, [one])
+def fit(known, *effects):
+    """Effects with their fit."""
+    hypothesis = hypotheses.weigh(known.reduced, effects)
     fitted = SimpleNamespace(
         total=known.plain.total - hypothesis.gain,
-        sigmas={one.effect.name: math.sqrt(max(hypothesis.gain, 0.0))},
+        sigmas={s.effect.name: math.sqrt(max(hypothesis.gain, 0.0)) for s in effects},
         variant=Variant(()),
     )
     return SimpleNamespace(hypothesis=hypothesis, fitted=fitted)
@@ -142,6 +142,22 @@ def test_a_hypothesis_whose_only_fit_ended_where_it_is_not_there_has_no_part(mon
     monkeypatch.setattr(probability, "is_there", lambda fitted: fitted is choice.fitted)
     assert "caster_trail" not in probability.weights(made, choice)
     assert "rolling_resistance" in probability.weights(made, choice)
+
+
+def test_what_was_fitted_beside_a_choice_takes_part_though_linear_algebra_did_not_ask_for_it(
+    monkeypatch,
+):
+    """Rivals of three effects at once are among no first pairs: the three were stated too high."""
+    monkeypatch.setattr(hypotheses, "pairs", lambda *_: [])
+    made = base(2.0, alike=0.9999)
+    one, alike, other = made.starts
+    choice = chosen(made, "rolling_resistance", ["caster_trail"])
+    fits = [fit(made, one, other), fit(made, alike, other)]
+    choice.hypothesis, choice.fitted, choice.tried = fits[0].hypothesis, fits[0].fitted, fits
+    known = probability.weights(made, choice)
+    assert known["caster_friction+caster_trail"].fitted
+    of_rival = known["caster_friction+caster_trail"].evidence
+    assert of_rival == pytest.approx(known["caster_friction+rolling_resistance"].evidence, abs=1.0)
 
 
 def test_a_force_of_any_form_speaks_against_effects_only_where_they_leave_a_gap():

@@ -19,6 +19,7 @@ from mjchair.diagnosis.explain import (
     choice,
     forward_selection,
     hypotheses,
+    left_over,
     multistart,
     open_ended,
     rivals,
@@ -356,7 +357,7 @@ def test_effects_left_over_while_the_noise_was_sought_come_before_pairs(fits, mo
             ("motor+wind", "track of motor+wind"): together,
         }
     )
-    monkeypatch.setattr(forward_selection, "is_worth", lambda *_: True)
+    monkeypatch.setattr(left_over, "is_worth", lambda *_: True)
     further = mock.Mock(return_value=None)
     monkeypatch.setattr(forward_selection, "further", further)
     looking = rolling_alone_first(monkeypatch, closes=together if closes else None)

@@ -1,8 +1,8 @@
 """Single effects that linear algebra around the chair without effects does not see, or sees small.
 
 In: fits, and the single effect that is best so far, with the gap that it leaves. Out: the same, or
-a better one: with what is only roughly known nearly as given, by most windows alone, of a whole
-size, or as it was left over while the noise was sought.
+a better one: with what is only roughly known nearly as given, by most windows alone, or of a whole
+size.
 """
 
 from __future__ import annotations
@@ -11,9 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import hypotheses, whole_sizes
-from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Tried
 from mjchair.diagnosis.explain.fits import Fits, believable, goes_far
 from mjchair.diagnosis.explain.screening import Base
@@ -65,22 +63,6 @@ def _or_weighed_by(fits: Fits, reduced: Reduced, here: WithGap | None) -> WithGa
     return best
 
 
-def or_left_over(fits: Fits, here: WithGap) -> WithGap:
-    """The single effect, or a better one that was left over while the noise was sought.
-
-    By linear algebra another may be the best alone.
-    """
-    known, left = fits.base.best, left_over(fits.base)
-    if not here[1].exists or known is None or len(known.starts) == 1 or len(left) != 1:
-        return here
-    alone = fits.weigh(left)
-    fits.begin_at(alone, known.fitted)
-    tried = fits.fit(alone)
-    if tried is None or tried.price >= here[0].price or not believable(tried.fitted):
-        return here
-    return tried, fits.gap_after(fits.anew(tried))
-
-
 def or_whole(fits: Fits, here: WithGap) -> WithGap:
     """The single effect, or one of a whole size that is better.
 
@@ -97,18 +79,6 @@ def or_whole(fits: Fits, here: WithGap) -> WithGap:
         if tried.price < best.price and believable(fitted):
             best = tried
     return here if best is here[0] else (best, fits.gap_after(best.fitted))
-
-
-def left_over(base: Base) -> list[Start]:
-    """The effects that are clear of what was best while the noise was sought.
-
-    There the best hypothesis of any size is fitted. In it, effects that only made up for a
-    large one being no linear one come to nothing.
-    """
-    known = base.best
-    if known is None:
-        return []
-    return [s for s in known.starts if known.fitted.sigmas[s.effect.key] > rules.SIGMAS]
 
 
 def _most_windows(base: Base) -> list[int]:

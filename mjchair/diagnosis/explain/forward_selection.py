@@ -7,16 +7,15 @@ grows as long as it leaves a gap and a further effect is worth it.
 from __future__ import annotations
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import alternatives, whole_sizes
+from mjchair.diagnosis.explain import alternatives, left_over
 from mjchair.diagnosis.explain.choice import Tried
 from mjchair.diagnosis.explain.fits import Fits, goes_far
-from mjchair.diagnosis.explain.left_out import held_out, with_terms
-from mjchair.diagnosis.explain.screening import gain
 from mjchair.diagnosis.explain.shortlist import (
     WithGap,
     best_of,
     best_single,
     better,
+    is_worth,
     of_size,
     promising,
 )
@@ -29,7 +28,7 @@ def grown(fits: Fits) -> WithGap | None:
     """
     if not _promises(fits):
         return None
-    here = _found(fits) or _left_over_together(fits)
+    here = _found(fits) or left_over.several(fits)
     size = len(here[0].hypothesis.starts) if here else 0
     while size < rules.MOST and (here is None or here[1].exists):
         size += 1
@@ -46,7 +45,8 @@ def grown(fits: Fits) -> WithGap | None:
             break  # where no second effect stands beside the first, no third does
         here = _settled(fits, more)
         if size == 1:
-            here = alternatives.or_left_over(fits, here)
+            if here[1].exists:
+                here = _settled(fits, better(here, left_over.of_size(fits, 1)) or here)
             here = alternatives.or_whole(fits, here)
     return here
 
@@ -67,25 +67,6 @@ def _found(fits: Fits) -> WithGap | None:
     return best, fits.gap_after(best.fitted)
 
 
-def _left_over_together(fits: Fits) -> WithGap | None:
-    """Several effects that were left over while the noise was sought; None: one may be enough.
-
-    Where the best single effect leaves a gap and these leave none, the usual way from one effect
-    to several is not gone. Of a caster that shimmies small changes tell nothing.
-    """
-    count = len(alternatives.left_over(fits.base))
-    single = best_single(fits)
-    if count < 2 or single is None or whole_sizes.shimmies(fits.base):
-        return None
-    alone = fits.believed(single)
-    if alone is not None and not fits.gap_after(alone.fitted).exists:
-        return None
-    together = _fitted_before(fits, count)
-    if together is None or together[1].exists:
-        return None
-    return together if alone is None or is_worth(fits, alone, together[0]) else None
-
-
 def further(fits: Fits, best: Tried | None, size: int) -> WithGap | None:
     """The best hypothesis of this many effects, and the gap that it leaves; None: none can be.
 
@@ -94,7 +75,7 @@ def further(fits: Fits, best: Tried | None, size: int) -> WithGap | None:
     """
     if best is not None and fits.near is not None:
         return best_of(fits, promising(fits, best), patient=False)
-    top = None if best is None else better(beside(fits, best), _fitted_before(fits, size))
+    top = None if best is None else better(beside(fits, best), left_over.of_size(fits, size))
     if best is not None and _closes(top, best):
         return top
     # perhaps the first effect stands in for two others
@@ -112,20 +93,6 @@ def beside(fits: Fits, best: Tried) -> WithGap | None:
     """
     with fits.near_to(best):
         return best_of(fits, promising(fits, best), patient=False)
-
-
-def _fitted_before(fits: Fits, size: int) -> WithGap | None:
-    """What was best while the noise was sought, if of so many effects, and the gap it leaves.
-
-    The first effect may stand in for two others, whose fit is at hand.
-    """
-    known, left = fits.base.best, alternatives.left_over(fits.base)
-    if known is None or size not in (len(left), len(known.starts)):
-        return None
-    every = fits.weigh(left if len(left) == size else known.starts)
-    fits.begin_at(every, known.fitted)
-    tried = fits.believed(every)
-    return None if tried is None else (tried, fits.gap_after(tried.fitted))
 
 
 def _closes(more: WithGap | None, best: Tried) -> bool:
@@ -155,18 +122,6 @@ def beyond_bound(fits: Fits, here: WithGap, size: int) -> WithGap | None:
         return None
     more = beside(fits, min(bound, key=lambda t: t.fitted.total))
     return more if more is not None and is_worth(fits, here[0], more[0]) else None
-
-
-def is_worth(fits: Fits, best: Tried, more: Tried) -> bool:
-    """Whether a larger hypothesis brings enough; both with everything made anew."""
-    base, one, other = fits.base, fits.anew(best), fits.anew(more)
-    held = held_out(base.bench, with_terms(base, one), with_terms(base, other))
-    return rules.worth_adding(
-        gained=one.total - other.total,
-        parameters=more.hypothesis.free - best.hypothesis.free,
-        held=held,
-        gain=gain(base, other),
-    )
 
 
 def _settled(fits: Fits, here: WithGap) -> WithGap:

@@ -31,8 +31,7 @@ Array = NDArray[np.float64]
 SIZES = 2.0  # sizes worth finding: standard deviation of a parameter before any data
 SPREAD = {Force.FORWARD: 5.0, Force.YAW: 1.5}  # N, N m: the same of a force outside the library
 # before any data (assumptions); what is left goes to one effect
-PRIOR_NONE, PRIOR_TWO, PRIOR_OUTSIDE = 0.3, 0.2, 0.1
-PRIOR_THREE = 0.05
+PRIOR_NONE, PRIOR_TWO, PRIOR_THREE, PRIOR_OUTSIDE = 0.3, 0.2, 0.05, 0.1
 
 
 def probabilities(base: Base, choice: Choice | None) -> dict[str, float]:
@@ -90,7 +89,7 @@ def weights(base: Base, choice: Choice | None) -> dict[str, Weight]:
     reduced, starts = base.reduced, base.starts
     keys = {s.effect.key: s.effect.common for s in starts}
     everything = sum(keys.values())
-    one = 1.0 - PRIOR_NONE - PRIOR_TWO - PRIOR_OUTSIDE
+    one = 1.0 - PRIOR_NONE - PRIOR_TWO - PRIOR_THREE - PRIOR_OUTSIDE
     out = {
         NONE: Weight(math.log(PRIOR_NONE), 0.0, True),
         OUTSIDE: Weight(math.log(PRIOR_OUTSIDE), _outside(reduced) - 0.5 * _overstated(base), True),
@@ -112,8 +111,9 @@ def weights(base: Base, choice: Choice | None) -> dict[str, Weight]:
     if choice is not None:
         for h in hypotheses.pairs(reduced, starts):
             add(h, PRIOR_TWO)
-        # what was left of three effects need not be among the first pairs
-        add(choice.hypothesis, (one, PRIOR_TWO, PRIOR_THREE)[len(choice.hypothesis.starts) - 1])
+        # three effects, their rivals, and what was left of them need not be among the first pairs
+        for h in (choice.hypothesis, *(t.hypothesis for t in choice.tried)):
+            add(h, (one, PRIOR_TWO, PRIOR_THREE)[min(len(h.starts), 3) - 1])
     return out
 
 

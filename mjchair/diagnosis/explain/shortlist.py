@@ -1,7 +1,7 @@
 """Which hypotheses are fitted, and in which order: those first that linear algebra likes best.
 
-In: fits, and the linear algebra that stands there. Out: hypotheses, best first, and of such a list
-the best that can be, with its fit and the gap that it leaves.
+In: fits, and the linear algebra that stands there. Out: hypotheses, best first, of such a list the
+best that can be, with its fit and the gap that it leaves, and whether a larger one is worth it.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from mjchair.diagnosis.explain.choice import Tried
 from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
+from mjchair.diagnosis.explain.left_out import held_out, with_terms
+from mjchair.diagnosis.explain.screening import gain
 
 TRIED = 3  # hypotheses of one size, where the first leaves a gap
 LISTED = 6  # hypotheses of one size, until one can be
@@ -107,6 +109,18 @@ def best_of(fits: Fits, options: Sequence[Hypothesis], patient: bool = True) -> 
 def better(one: WithGap | None, other: WithGap | None) -> WithGap | None:
     """The one with the lower price; None: there is neither."""
     return min((t for t in (one, other) if t is not None), key=lambda t: t[0].price, default=None)
+
+
+def is_worth(fits: Fits, best: Tried, more: Tried) -> bool:
+    """Whether a larger hypothesis brings enough; both with everything made anew."""
+    base, one, other = fits.base, fits.anew(best), fits.anew(more)
+    held = held_out(base.bench, with_terms(base, one), with_terms(base, other))
+    return rules.worth_adding(
+        gained=one.total - other.total,
+        parameters=more.hypothesis.free - best.hypothesis.free,
+        held=held,
+        gain=gain(base, other),
+    )
 
 
 def _commonest(fits: Fits, options: Sequence[Hypothesis]) -> Hypothesis:
