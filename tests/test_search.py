@@ -5,6 +5,7 @@ In: totals (chi2) of fits, given by name. Out: which fit the search takes.
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
 from unittest import mock
@@ -274,6 +275,20 @@ def test_a_rival_takes_the_place_only_once_both_are_made_anew(rival, takes, fits
     monkeypatch.setattr(rivals, "rivals_of", lambda _, best: [others[best.hypothesis.keys[0]]])
     best, _ = rivals.against_rivals(looking, chosen)
     assert best.hypothesis is (motor if takes else ONE)
+
+
+@pytest.mark.parametrize("alone", [None, 1500.0])
+def test_an_effect_brings_what_the_others_lose_without_it(alone, monkeypatch):
+    """Around a caster that is stuck linear algebra says that nothing is lost if it is free."""
+    linear = {BOTH.starts: BOTH, (MOTOR,): replace(BOTH, gain=BOTH.gain - 2.0)}
+    looking = searching()
+    monkeypatch.setattr(looking, "near_to", lambda _: nullcontext())
+    monkeypatch.setattr(looking, "weigh", lambda starts: linear[tuple(starts)])
+    if alone is not None:
+        motor = Hypothesis((MOTOR,), gain=500.0, score=490.0)
+        looking.tried.append(Tried(motor, fit(alone, "motor")))
+    own = rivals._own_gain(looking, Tried(BOTH, fit(1104.0, "rolling", "motor")), ROLLING)
+    assert own == (2.0 if alone is None else alone - 1104.0)
 
 
 def test_a_second_effect_is_weighed_around_the_fit_of_the_first(fits, monkeypatch):

@@ -6,6 +6,7 @@ themselves stand in rules.py; here their numbers are gathered.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -131,13 +132,27 @@ def standing(
         gap_left=choice.after.exists,
         gain_by_run=held_out_gain(base, fitted),
         gain_by_manoeuvre=held_out_gain(base, fitted, "manoeuvre"),
-        sigmas=tuple(fitted.sigmas.values()),
+        sigmas=_sigmas(choice),
         at_bound=bool(fitted.at_bound),
         rivals=sum(len(group) for group in choice.rivals),
         probability=of_effects(probability, choice.hypothesis.keys),
         once=_once(base, choice, held),
         runs=len(base.bench.simulator.study.fitted),
         held_out=held,
+    )
+
+
+def _sigmas(choice: Choice) -> tuple[float, ...]:
+    """Of every effect, how far it is from neutral in standard errors.
+
+    Where far larger sizes fit as well, no standard error tells; what the effect brings does.
+    """
+    fitted, starts = choice.fitted, choice.hypothesis.starts
+    own = {s.effect.key: g for s, g in zip(starts, choice.own_gains, strict=True)}
+    endless = {parameter.effect for parameter in fitted.at_least}
+    return tuple(
+        math.sqrt(max(own[key], 0.0)) if key in endless else sigmas
+        for key, sigmas in fitted.sigmas.items()
     )
 
 

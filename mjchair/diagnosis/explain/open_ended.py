@@ -1,11 +1,15 @@
 """Sizes beyond which nothing changes: a caster that is stuck shows that it is, and not by how much.
 
-In: a fit. Out: the fit; where an effect of a far larger size fits as well, with the least size that
-the data allow, and with a standard error that reaches to the far one.
+In: a fit. Out: the fit; where an effect of a far larger size fits as well, at the least size that
+fits alike, with the least size that the data do not rule out, and with a standard error that
+reaches to the far one. Of sizes that runs cannot tell apart, the least is the one that changes the
+chair least where no run has been: a caster that 0.3 N m hold still turns over as the chair
+reverses, one that 2 hold does not.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -20,26 +24,49 @@ from mjchair.errors import MjchairError
 
 FURTHER = 8.0  # times the size: far beyond what a standard error may say of it
 LEAST = 2.0  # times the size that bounds must allow: what is near fits nearly as well anyhow
-HALVINGS = 5  # of the way from no effect to the size, until the least one is found
+SMALLEST = 1.0 / 64.0  # of the size, at which the search for the least one begins
+HALVINGS = 6  # of the way from there, on a logarithmic scale
 
 
 def with_least_sizes(base: Base, fitted: Fitted) -> Fitted:
     """The fit, with `at_least` and standard errors of sizes that are open upwards."""
-    std, at_least = dict(fitted.std), {}
-    for term in fitted.variant.terms:
+    best = fitted
+    for term in best.variant.terms:
         p = _one_sided(term)
-        if p is None:
-            continue
-        size = term.values[p.name] - p.neutral
-        far = min(max(p.neutral + FURTHER * size, p.low), p.high)
-        if abs(far - p.neutral) < LEAST * abs(size):
-            continue
-        if not _fits(base, fitted, _held(term, p, far)):
-            continue
-        key = ParameterId(term.effect.key, p.name)
-        at_least[key] = _least(base, fitted, term, p)
-        std[key] = max(std[key], abs(far - term.values[p.name]))
-    return replace(fitted, std=std, at_least=at_least) if at_least else fitted
+        far = None if p is None else _far(term, p)
+        if p is not None and far is not None:
+            fitted = _with_least(base, best, fitted, (term, p, far))
+    return fitted
+
+
+def _far(term: Term, p: Parameter) -> float | None:
+    """A far larger size, within bounds; None: they leave none."""
+    size = term.values[p.name] - p.neutral
+    far = min(max(p.neutral + FURTHER * size, p.low), p.high)
+    return None if abs(far - p.neutral) < LEAST * abs(size) else far
+
+
+def _with_least(
+    base: Base, best: Fitted, fitted: Fitted, looked: tuple[Term, Parameter, float]
+) -> Fitted:
+    """A fit with the least size of one effect, if that is open upwards.
+
+    Args:
+      best: as it was found. fitted: the same with least sizes of other effects.
+      looked: the effect, its size, and a far larger one.
+    """
+    term, p, far = looked
+    ruled_out = best.total + rules.not_ruled_out(gain=gain(base, best))
+    if _at(base, fitted, _held(term, p, far), ruled_out) is None:
+        return fitted
+    smallest = p.neutral + SMALLEST * (term.values[p.name] - p.neutral)
+    ends, _ = _least(base, fitted, term, p, (smallest, ruled_out))
+    least, there = _least(base, fitted, term, p, (ends, best.total + rules.TIE))
+    at = fitted if there is None else _freed(base, there, term)
+    key = ParameterId(term.effect.key, p.name)
+    opened = {k: fitted.std[k] for k in fitted.at_least}
+    std = at.std | opened | {key: max(at.std[key], abs(far - least))}
+    return replace(at, std=std, at_least=fitted.at_least | {key: ends})
 
 
 def _one_sided(term: Term) -> Parameter | None:
@@ -50,16 +77,24 @@ def _one_sided(term: Term) -> Parameter | None:
     return sized[0]
 
 
-def _least(base: Base, fitted: Fitted, term: Term, p: Parameter) -> float:
-    """The least size that fits, between no effect and the size that was found."""
-    low, high = p.neutral, term.values[p.name]
+def _least(
+    base: Base, fitted: Fitted, term: Term, p: Parameter, limits: tuple[float, float]
+) -> tuple[float, Fitted | None]:
+    """The least size that fits, up to the size that was found, and its fit; None: that size.
+
+    Args:
+      limits: a size that may be too small, and the largest chi2 of one that fits.
+    """
+    (low, most), high, found = limits, term.values[p.name], None
     for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        if _fits(base, fitted, _held(term, p, middle)):
-            high = middle
-        else:
+        share = math.sqrt((low - p.neutral) / (high - p.neutral))
+        middle = p.neutral + share * (high - p.neutral)
+        there = _at(base, fitted, _held(term, p, middle), most)
+        if there is None:
             low = middle
-    return high
+        else:
+            high, found = middle, there
+    return high, found
 
 
 def _held(term: Term, p: Parameter, size: float) -> Term:
@@ -67,17 +102,25 @@ def _held(term: Term, p: Parameter, size: float) -> Term:
     return Term(term.effect, {**term.values, p.name: size}, ())
 
 
-def _fits(base: Base, fitted: Fitted, held: Term) -> bool:
-    """Whether an effect that is held so is not ruled out, with all else moved as it likes."""
-    most = fitted.total + rules.not_ruled_out(gain=gain(base, fitted))
+def _at(base: Base, fitted: Fitted, held: Term, most: float) -> Fitted | None:
+    """The fit with an effect that is held so, all else moved; None: its chi2 is over `most`."""
     terms = tuple(held if t.effect is held.effect else t for t in fitted.variant.terms)
     start = replace(fitted.variant, terms=terms)
     nuisances = nuisances_of(base, fitted)
     try:
         there = refit(base.bench, start, fitted.track, nuisances, rounds=0)
         if there.promised > most:
-            return False
+            return None
         there = refit(base.bench, start, there.track, nuisances)
     except (MjchairError, np.linalg.LinAlgError):
-        return False  # this chair cannot have it
-    return there.total < most
+        return None  # this chair cannot have it
+    return there if there.total < most else None
+
+
+def _freed(base: Base, there: Fitted, term: Term) -> Fitted:
+    """The fit where an effect was held, with its size free again, and no step taken."""
+    terms = tuple(
+        replace(t, free=term.free) if t.effect is term.effect else t for t in there.variant.terms
+    )
+    start = replace(there.variant, terms=terms)
+    return refit(base.bench, start, there.track, nuisances_of(base, there), rounds=0)
