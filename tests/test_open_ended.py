@@ -89,7 +89,7 @@ def test_of_sizes_that_fit_alike_the_least_stands_in_the_chair(monkeypatch, size
 
 
 def test_an_effect_of_an_open_size_is_as_sure_as_what_it_brings():
-    """No standard error tells that a stuck caster is stuck: beside it, it seemed not to be there."""
+    """No standard error tells that a caster is stuck: by it, the caster seemed to be free."""
     stuck, camber = (SimpleNamespace(effect=find(n)) for n in ("caster_friction", "camber"))
     fitted = SimpleNamespace(sigmas={"caster_friction": 1.3, "camber": 10.0}, at_least={})
     choice = SimpleNamespace(

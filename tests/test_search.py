@@ -280,10 +280,10 @@ def test_a_rival_takes_the_place_only_once_both_are_made_anew(rival, takes, fits
 @pytest.mark.parametrize("alone", [None, 1500.0])
 def test_an_effect_brings_what_the_others_lose_without_it(alone, monkeypatch):
     """Around a caster that is stuck linear algebra says that nothing is lost if it is free."""
-    linear = {BOTH.starts: BOTH, (MOTOR,): replace(BOTH, gain=BOTH.gain - 2.0)}
+    linear = {2: BOTH, 1: replace(BOTH, gain=BOTH.gain - 2.0)}
     looking = searching()
     monkeypatch.setattr(looking, "near_to", lambda _: nullcontext())
-    monkeypatch.setattr(looking, "weigh", lambda starts: linear[tuple(starts)])
+    monkeypatch.setattr(looking, "weigh", lambda starts: linear[len(starts)])
     if alone is not None:
         motor = Hypothesis((MOTOR,), gain=500.0, score=490.0)
         looking.tried.append(Tried(motor, fit(alone, "motor")))
