@@ -178,3 +178,19 @@ def test_after_a_short_step_the_next_is_twice_as_long_and_not_whole(monkeypatch)
     found = nonlinear.refit(SimpleNamespace(simulator=None), Variant(()), None, {})
     failed = sum(t not in best for t in tried)
     assert failed <= 4 and found.total < 105.0
+
+
+@pytest.mark.parametrize(
+    ("effect", "value", "on"),
+    [
+        ("camber", -0.3, True),
+        ("camber", -0.29982, True),  # as a line search ended that went on to the bound
+        ("camber", -0.29, False),
+        ("camber", 0.0, False),
+        ("caster_friction", 0.0, False),  # there the effect is not there
+        ("caster_friction", 9.995, True),
+    ],
+)
+def test_a_size_ends_on_a_bound_or_beside_it(effect, value, on):
+    (p,) = library.find(effect).parameters
+    assert nonlinear._on_bound(p, value) == on

@@ -37,6 +37,7 @@ SHORTER = (0.1, 0.5)  # of a step that fails: the least and the most that is tri
 LONGER = 2.0  # times the share of a step that brought something, for the next
 NEARER = (0.3, 0.1, 0.03)  # of the way from a part of the effects to a start that fits worse
 FAILS = 3  # steps in a row that bring nothing, after which a fit ends
+ON_BOUND = 1e-3  # of the width between bounds: a line search may end this near one
 DONE = 1.0  # chi2 that a further round must promise
 ROUGH = 10.0  # chi2 promised, below which a fit ends where a round brings less than half of DONE
 
@@ -234,7 +235,10 @@ def _outside(bench: Bench, system: System, count: int) -> list[int]:
 
 def _on_bound(p: Parameter, value: float) -> bool:
     """Whether the size of an effect ended on a bound that is not where the effect is not there."""
-    return p.sized and value in (p.low, p.high) and not p.low == p.neutral == value
+    near = ON_BOUND * (p.high - p.low)
+    return p.sized and any(
+        abs(value - bound) <= near and bound != p.neutral for bound in (p.low, p.high)
+    )
 
 
 def _shorter(best: Fitted, total: float, share: float) -> float:

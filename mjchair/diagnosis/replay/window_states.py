@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mjchair.diagnosis.data import first_state
 from mjchair.diagnosis.data.windows import Window
-from mjchair.diagnosis.replay.chair_state import BROAD, LINKED, SLOW, STANDING, STEPS, Chair, State
+from mjchair.diagnosis.replay.chair_state import BROAD, LINKED, SLOW, STANDING, STEPS, State
 from mjchair.diagnosis.replay.noise import Noise
 from mjchair.diagnosis.replay.sampling import residual
 from mjchair.diagnosis.replay.sensor_errors import SensorErrors
@@ -132,7 +132,6 @@ def track(
         model that is not far; its answers to the slow state are kept, unless made `anew`.
       only: windows to fit; the others stay as they were `before`. None: all.
     """
-    chair = simulator.chair
     coarse = simulator.coarsened(model)
     white = np.array([noise[c].total for c in simulator.channels])
     errors = errors or SensorErrors(simulator.channels)
@@ -162,7 +161,7 @@ def track(
                 }
                 if not going:
                     break
-                _fit_round(simulator, chair, (model, coarse), errors, going, white, slow, kept)
+                _fit_round(simulator, (model, coarse), errors, going, white, slow, kept)
             moved = {i: s.state for i, s in search.items() if not s.calm}
             for i, outcome in _traced(simulator, model, moved).items():
                 w = simulator.windows[i]
@@ -245,7 +244,6 @@ def _size(simulator: WindowSimulator, window: Window, seen: Array, white: Array)
 
 def _fit_round(
     simulator: WindowSimulator,
-    chair: Chair,
     models: tuple[mujoco.MjModel, mujoco.MjModel],
     errors: SensorErrors,
     search: dict[int, Search],
@@ -269,10 +267,10 @@ def _fit_round(
             good.append(i)
         else:
             s.change, s.promise = 0.3 * s.change, 0.3 * s.promise  # a step too far
-            s.state = chair.moved(s.best, s.change)
+            s.state = simulator.chair.moved(s.best, s.change)
     for model, share, touchy in ((coarse, 1.0, False), (fine, FINER, True)):
         some = {i: state for i, state in asked.items() if search[i].touchy == touchy}
-        for i, answers in _answers(simulator, chair, model, errors, some, share).items():
+        for i, answers in _answers(simulator, model, errors, some, share).items():
             slow[i] = answers
     for i in good:
         s = search[i]
@@ -281,12 +279,11 @@ def _fit_round(
         if s.calm:
             continue
         s.change = change * STEPS
-        s.state = chair.moved(s.state, s.change)
+        s.state = simulator.chair.moved(s.state, s.change)
 
 
 def _answers(
     simulator: WindowSimulator,
-    chair: Chair,
     model: mujoco.MjModel,
     errors: SensorErrors,
     states: dict[int, State],
@@ -299,7 +296,7 @@ def _answers(
     """
     jobs = []
     for i, state in states.items():
-        moved = [chair.moved(state, step) for step in share * np.diag(STEPS)]
+        moved = [simulator.chair.moved(state, step) for step in share * np.diag(STEPS)]
         jobs += [Job(model, simulator.windows[i], s) for s in (state, *moved)]
     outcomes = iter(simulator.run(jobs))
     out = {}
@@ -322,9 +319,7 @@ def _step(
     """
     miss = residual(simulator.measured(simulator.windows[i]), search.predicted, simulator.channels)
     there = ~np.isnan(miss)
-    louder = max(
-        1.0, search.size / max(int(there.sum()), 1)
-    )  # power of what is left, over the noise
+    louder = max(1.0, search.size / max(int(there.sum()), 1))  # power left, over the noise
     columns = np.concatenate([slow, zero_columns(simulator)[None].repeat(len(miss), 0)], 2)
     a = (columns / white[None, :, None])[there]
     b = (miss / white)[there]
