@@ -94,7 +94,7 @@ def test_a_step_that_promised_much_and_failed_is_made_anew_with_small_changes(mo
     """Answers to large changes, at a coarse step, lead astray where a wheel slides or shimmies."""
     asked = []
 
-    def answers(simulator, chair, model, errors, states, share):
+    def answers(simulator, model, errors, states, share):
         asked.extend((model, i, share) for i in states)
         return {i: "new" for i in states}
 
@@ -109,7 +109,7 @@ def test_a_step_that_promised_much_and_failed_is_made_anew_with_small_changes(mo
     going = {k: window_states.Search("tried", "best", 4.0) for k in range(2)}
     going[0].promise, going[1].promise = 2.0, 0.3
     slow = ["old", "old"]
-    arguments = (simulator, chair, ("fine", "coarse"), errors, going, WHITE, slow, True)
+    arguments = (simulator, ("fine", "coarse"), errors, going, WHITE, slow, True)
     window_states._fit_round(*arguments)
     assert asked == [("fine", 0, window_states.FINER)] and slow == ["new", "old"]
     assert going[0].touchy and not going[1].touchy
