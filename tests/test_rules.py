@@ -10,7 +10,7 @@ from mjchair.diagnosis import rules
 from mjchair.diagnosis.rules import HeldOut, Standing, Verdict
 from mjchair.report.diagnosis_words import nothing_missing
 
-# an effect that closes all, is sure, and has no rival
+# an effect that closes all and is sure
 CLEAR = Standing(
     closure=0.99,
     gap_left=False,
@@ -18,7 +18,6 @@ CLEAR = Standing(
     gain_by_manoeuvre=300.0,
     sigmas=(20.0,),
     at_bound=False,
-    rivals=0,
 )
 
 
@@ -80,7 +79,6 @@ def test_just_inside_each_limit_it_is_still_named(allowed):
         {"sigmas": (20.0, rules.SIGMAS)},
         {"at_bound": True},
         {"gain_by_manoeuvre": 0.0},
-        {"rivals": 1},
         {"closure": rules.CLOSES - 0.01},
         {"closure": rules.PARTLY},
         {"probability": rules.PROBABLE - 0.01},

@@ -134,7 +134,6 @@ def standing(
         gain_by_manoeuvre=held_out_gain(base, fitted, "manoeuvre"),
         sigmas=_sigmas(choice),
         at_bound=bool(fitted.at_bound),
-        rivals=sum(len(group) for group in choice.rivals),
         probability=of_effects(probability, choice.hypothesis.keys),
         once=_once(base, choice, held),
         runs=len(base.bench.simulator.study.fitted),

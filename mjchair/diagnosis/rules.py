@@ -114,8 +114,8 @@ class Standing:
         fails. gain_by_run, gain_by_manoeuvre: chi2 that they bring on each run, or manoeuvre, when
         they are fitted to the others.
       sigmas: of every effect, how far it is from neutral in standard errors.
-      at_bound: whether a parameter ended on a bound. rivals: effects that could stand in a place.
-      probability: of the effects. once: whether something that happened once fits as well.
+      at_bound: whether a parameter ended on a bound. probability: of the effects, against rivals
+        and all else. once: whether something that happened once fits as well.
       runs: that were fitted to.
       held_out: the trials that no fit saw; None where there are none.
     """
@@ -126,7 +126,6 @@ class Standing:
     gain_by_manoeuvre: float
     sigmas: tuple[float, ...]
     at_bound: bool
-    rivals: int
     probability: float = 1.0
     once: bool = False
     runs: int = 2
@@ -162,7 +161,7 @@ def verdict(gap: bool, choice: Standing | None) -> Verdict:
         return Verdict.NONE
     if choice is None or not explains(choice):
         return Verdict.UNKNOWN
-    alone = not choice.rivals and not choice.once and choice.probability >= PROBABLE
+    alone = not choice.once and choice.probability >= PROBABLE
     # in a single run nothing tells an effect from what is left beside it
     whole = not choice.gap_left or choice.runs > 1
     carried = choice.held_out is None or carries_over(choice.held_out)

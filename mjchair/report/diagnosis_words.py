@@ -205,7 +205,7 @@ def alike_words(diagnosis: Diagnosis) -> str:
         sets = "; ".join(" / ".join(bold(n) for n in s) for s in diagnosis.alternatives)
         return f"Not to be told apart by these data: {sets}."
     if diagnosis.verdict == Verdict.NAMED:
-        return "No two explanations are left that these data cannot tell apart."
+        return "All other explanations together have a probability of 5 % at most."
     return ""
 
 
@@ -216,7 +216,7 @@ def choice_words(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == Verdict.NAMED:
         return (
             "It is significant, it holds on runs that it was not fitted to, it closes most of the "
-            "gap, and no rival comes near."
+            "gap, and its probability is 95 % or more."
         )
     if diagnosis.verdict == Verdict.AMBIGUOUS:
         return (
