@@ -12,6 +12,7 @@ from mjchair.diagnosis.data.study import make_study
 from mjchair.diagnosis.explain import left_out
 from mjchair.diagnosis.explain.left_out import held_out
 from mjchair.diagnosis.explain.screening import prepare, screen_columns
+from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import RoughlyKnown
 from mjchair.diagnosis.fit.system import System
 from mjchair.simulation.initial import Initial
@@ -97,7 +98,7 @@ def told_otherwise(base, by):
     """Chi2 of held-out windows where every speed is foretold otherwise by `by` (samples,)."""
     before = base.plain.track.predicted
     predicted = [p + by[: len(p), None] for p in before]
-    fitted = SimpleNamespace(track=SimpleNamespace(predicted=predicted), system=base.plain.system)
+    fitted = replace(base.plain, track=SimpleNamespace(predicted=predicted))
     return left_out.on_held_out(base, fitted).changed
 
 
@@ -107,3 +108,45 @@ def test_what_is_foretold_otherwise_counts_by_its_square(base):
     once = told_otherwise(base, wave)
     assert once > 10.0
     assert told_otherwise(base, 2.0 * wave) == pytest.approx(4.0 * once, rel=1e-9)
+
+
+def foretold(rng, sizes, missing=0.0):
+    """Chi2 over its dof of two held-out runs, foretold by two that were fitted to, and as they are.
+
+    Args:
+      missing: what the held-out runs show that no number makes.
+      sizes: (2, numbers) by which numbers that are roughly known show in the runs that were fitted
+        to, and in those that were held out.
+    """
+    kinds = np.repeat(np.asarray(sizes, float), 2, axis=0)
+    columns = [rng.standard_normal((ROWS, kinds.shape[1])) * size for size in kinds]
+    truth = rng.standard_normal(kinds.shape[1])
+    data = [J @ truth + rng.standard_normal(ROWS) for J in columns]
+    data[2:] = [r + missing * rng.standard_normal(ROWS) for r in data[2:]]
+    whole = replace(
+        system(columns, data),
+        nuisance=len(truth),
+        back=np.zeros(len(truth)),
+        slow=[[np.column_stack([r, J])] for r, J in zip(data, columns, strict=True)],
+    )
+    fitted_to, held = np.array([0, 1]), np.array([2, 3])
+    step = bounded.solve(whole, fitted_to, [])[0]
+    base = SimpleNamespace(bench=SimpleNamespace(windows=fitted_to))
+    chi2, dof = left_out._foretold(base, SimpleNamespace(system=whole, step=step), held)
+    left = np.concatenate([data[i] - columns[i] @ step for i in held])
+    return chi2 / dof, left @ left / left.size
+
+
+def test_what_no_run_tells_is_no_gap_in_one_that_was_held_out():
+    """Nothing was hidden: a centre of mass a little aside, which turns alone show, was a gap."""
+    rng = np.random.default_rng(11)
+    found = np.array([foretold(rng, [[1.0, 0.0], [1.0, 3.0]]) for _ in range(200)])
+    assert found[:, 0].mean() == pytest.approx(1.0, abs=0.05)
+    assert found[:, 1].mean() > 4.0
+
+
+@pytest.mark.parametrize("size", [0.0, 3.0])
+def test_what_no_number_makes_stays_a_gap(size):
+    rng = np.random.default_rng(11)
+    told, _ = foretold(rng, [[1.0, size], [1.0, 3.0]], missing=3.0)
+    assert told > 5.0
