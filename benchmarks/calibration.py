@@ -55,6 +55,9 @@ COMMAND = (
 FOLDS = 5
 LEAST = 1e-4  # a probability of what was hidden, that counts in the fit of the temper
 GROUP = 20  # studies that are alike for the isotonic regression
+# the most that evidence is divided by: of 5709 studies a temper of 100 makes the hidden hypothesis
+# e^0.16 times as probable as one of 12, and rivals that the data tell apart look alike
+HOTTEST = 12.0
 FAR = 1000.0  # log-odds beyond which all are alike
 ONES = tuple(np.r_[-FAR, np.linspace(-30.0, 30.0, 121), FAR])
 BANDS = (0.0, 0.5, 0.7, 0.9, 0.95, 0.99, 1.0)
@@ -116,9 +119,7 @@ def fit(studies: Sequence[Drawn], made: str = "") -> Calibration:
         raw = uncalibrated(temper)
         return -float(np.mean([_log_of_truth(raw, s) for s in studies]))
 
-    temper = float(
-        minimize_scalar(miss, (1.0, 30.0), bounds=(1.0, 30.0), options={"xatol": 0.02}).x
-    )
+    temper = float(minimize_scalar(miss, bounds=(1.0, HOTTEST), options={"xatol": 0.02}).x)
     raw = uncalibrated(temper)
     kinds: dict[str, list[tuple[float, bool]]] = {name: [] for name in LINES}
     for study in studies:
