@@ -127,3 +127,11 @@ def test_a_spec_is_stored_as_xml_and_a_model_as_mjb():
     assert stored.load().njnt == 1
     with pytest.raises(MjchairError, match="does not load"):
         StoredModel("xml", b"<mujoco").load()
+
+
+def test_a_damaged_model_leaves_no_log_of_the_engine(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    whole = StoredModel.of(mujoco.MjModel.from_xml_string(XML))
+    with pytest.raises(MjchairError, match="does not load"):
+        StoredModel("mjb", whole.content[:1000]).load()
+    assert capfd.readouterr() == ("", "") and not list(tmp_path.iterdir())

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from mjchair.errors import MjchairError
+from mjchair.model.engine_warnings import without_engine_warnings
 from mjchair.model.spec import without_python_callbacks
 
 
@@ -54,7 +55,8 @@ class StoredModel:
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / "model.mjb"
                 path.write_bytes(self.content)
-                return mujoco.MjModel.from_binary_path(str(path))
+                with without_engine_warnings():
+                    return mujoco.MjModel.from_binary_path(str(path))
         except (ValueError, UnicodeDecodeError) as error:
             line = str(error).strip().splitlines()[0]
             raise MjchairError(
