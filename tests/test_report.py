@@ -245,6 +245,27 @@ def test_probabilities_have_a_sentence_and_bars():
     assert_legible(figure)
 
 
+def test_the_named_effects_with_more_beside_them_count_for_them():
+    """A named motion of the rider stood at 90 %, which is less than `named` asks for."""
+    found = diagnosis()
+    found.probability = {
+        "rolling_resistance": 0.90,
+        "rolling_resistance+toe": 0.04,
+        "air_drag+rolling_resistance": 0.02,
+        "outside": 0.03,
+        "toe": 0.01,
+    }
+    said = words.sure(found)
+    assert said.startswith(
+        "Probability: 96 % rolling resistance (90 % with nothing more), 3 % something"
+    )
+    figure = probability.figure(found)
+    assert [bar.get_width() for bar in figure.axes[0].patches] == pytest.approx(
+        [1.0, 3.0, 6.0, 90.0]
+    )
+    assert_legible(figure)
+
+
 def test_a_replay_has_its_place_and_is_shown_as_it_is():
     assert '<section id="replay"><p>here</p></section>' in page(
         diagnosis(), {}, replay="<p>here</p>"

@@ -112,7 +112,7 @@ def sure(diagnosis: Diagnosis) -> str:
     """How sure that is, in one sentence."""
     probability: Mapping[str, float] | None = getattr(diagnosis, "probability", None)
     if probability:
-        return _probabilities(probability)
+        return _probabilities(probability, named_keys(diagnosis))
     gap = diagnosis.gap
     if gap is None:
         return "Nothing was tested."
@@ -131,10 +131,30 @@ def sure(diagnosis: Diagnosis) -> str:
     return f"{where} {before} as it was{after}."
 
 
-def _probabilities(probability: Mapping[str, float]) -> str:
-    ordered = sorted(probability.items(), key=lambda item: -item[1])
+def _probabilities(probability: Mapping[str, float], named: set[str]) -> str:
+    alone, more, others = with_more(probability, named)
+    ordered = sorted(others.items(), key=lambda item: -item[1])
     said = [f"{100 * p:.0f} % {hypothesis_words(name)}" for name, p in ordered[:3] if p >= UNSURE]
+    if more >= UNSURE:
+        words = hypothesis_words("+".join(sorted(named)))
+        said[:0] = [f"{100 * (alone + more):.0f} % {words} ({100 * alone:.0f} % with nothing more)"]
+        said = [line for line in said if line != f"{100 * alone:.0f} % {words}"][:3]
     return "Probability: " + ", ".join(said) + "."
+
+
+def named_keys(diagnosis: Diagnosis) -> set[str]:
+    """Keys of the effects of a diagnosis, as they stand in its probabilities."""
+    return {f"{e.name}:{e.channel}" if e.channel else e.name for e in diagnosis.effects}
+
+
+def with_more(
+    probability: Mapping[str, float], named: set[str]
+) -> tuple[float, float, dict[str, float]]:
+    """Probability of the named effects alone, of them with more, and of all but the latter."""
+    names = {name: set(name.split("+")) for name in probability}
+    alone = sum(p for n, p in probability.items() if names[n] == named)
+    more = sum(p for n, p in probability.items() if named and named < names[n])
+    return alone, more, {n: p for n, p in probability.items() if not (named and named < names[n])}
 
 
 def hypothesis_words(name: str) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from mjchair.diagnosis.result import Diagnosis
 from mjchair.report.colours import AFTER, FAINT
-from mjchair.report.diagnosis_words import hypothesis_words
+from mjchair.report.diagnosis_words import hypothesis_words, named_keys, with_more
 from mjchair.report.figure import Figure
 
 MOST = 8  # bars; the rest is one more
@@ -17,18 +17,25 @@ LEAST = 0.005  # a probability below this has no bar of its own
 
 
 def figure(diagnosis: Diagnosis) -> Figure | None:
-    """Bars, the most probable first; what is named has the colour of the corrected chair."""
+    """Bars, the most probable first; what is named has the colour of the corrected chair.
+
+    Explanations that hold what is named and more are one bar under it: together they are how
+    probable it is that the named effects are there.
+    """
     probability: Mapping[str, float] | None = getattr(diagnosis, "probability", None)
     if not probability:
         return None
-    named = "+".join(sorted(e.name for e in diagnosis.effects))
-    ordered = sorted(probability.items(), key=lambda item: -item[1])
+    named = named_keys(diagnosis)
+    _, more, others = with_more(probability, named)
+    ordered = sorted(others.items(), key=lambda item: -item[1])
     shown = [(name, p) for name, p in ordered if p >= LEAST][:MOST]
-    bars = [
-        (hypothesis_words(name), p, AFTER if "+".join(sorted(name.split("+"))) == named else FAINT)
-        for name, p in shown
-    ]
-    rest = sum(probability.values()) - sum(p for _, p in shown)
+    bars = []
+    for name, p in shown:
+        own = set(name.split("+")) == named
+        bars.append((hypothesis_words(name), p, AFTER if own else FAINT))
+        if own and more >= LEAST:
+            bars.append(("the same, and more", more, AFTER))
+    rest = sum(probability.values()) - sum(p for _, p, _ in bars)
     if rest >= LEAST:
         bars.append(("everything else", rest, FAINT))
     names, values, colours = zip(*bars[::-1], strict=True)
