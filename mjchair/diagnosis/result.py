@@ -64,6 +64,11 @@ class NamedEffect:
     channel: str | None = None
     remark: str = ""
 
+    @property
+    def key(self) -> str:
+        """As it stands in the probabilities: its name, with the channel where there is one."""
+        return f"{self.name}:{self.channel}" if self.channel else self.name
+
     def to_dict(self) -> dict[str, Any]:
         """As in diagnosis.json."""
         out: dict[str, Any] = {

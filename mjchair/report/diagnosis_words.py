@@ -7,7 +7,8 @@ is typed, for the page to show; nothing here is HTML.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
+from typing import NamedTuple
 
 from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.next_experiment.wording import plain
@@ -110,9 +111,8 @@ def _person_words(diagnosis: Diagnosis) -> str:
 
 def sure(diagnosis: Diagnosis) -> str:
     """How sure that is, in one sentence."""
-    probability: Mapping[str, float] | None = getattr(diagnosis, "probability", None)
-    if probability:
-        return _probabilities(probability, named_keys(diagnosis))
+    if diagnosis.probability:
+        return _probabilities(diagnosis)
     gap = diagnosis.gap
     if gap is None:
         return "Nothing was tested."
@@ -131,30 +131,49 @@ def sure(diagnosis: Diagnosis) -> str:
     return f"{where} {before} as it was{after}."
 
 
-def _probabilities(probability: Mapping[str, float], named: set[str]) -> str:
-    alone, more, others = with_more(probability, named)
-    ordered = sorted(others.items(), key=lambda item: -item[1])
-    said = [f"{100 * p:.0f} % {hypothesis_words(name)}" for name, p in ordered[:3] if p >= UNSURE]
-    if more >= UNSURE:
-        words = hypothesis_words("+".join(sorted(named)))
-        said[:0] = [f"{100 * (alone + more):.0f} % {words} ({100 * alone:.0f} % with nothing more)"]
-        said = [line for line in said if line != f"{100 * alone:.0f} % {words}"][:3]
+def _probabilities(diagnosis: Diagnosis) -> str:
+    said = [_stated(e) for e in explanations(diagnosis)[:3] if e.alone + e.more >= UNSURE]
     return "Probability: " + ", ".join(said) + "."
 
 
-def named_keys(diagnosis: Diagnosis) -> set[str]:
-    """Keys of the effects of a diagnosis, as they stand in its probabilities."""
-    return {f"{e.name}:{e.channel}" if e.channel else e.name for e in diagnosis.effects}
+def _stated(explanation: Explanation) -> str:
+    alone, more = 100.0 * explanation.alone, 100.0 * explanation.more
+    words = hypothesis_words(explanation.name)
+    if explanation.more < UNSURE:
+        return f"{alone:.0f} % {words}"
+    return f"{alone + more:.0f} % {words} ({alone:.0f} % with nothing more)"
 
 
-def with_more(
-    probability: Mapping[str, float], named: set[str]
-) -> tuple[float, float, dict[str, float]]:
-    """Probability of the named effects alone, of them with more, and of all but the latter."""
-    names = {name: set(name.split("+")) for name in probability}
-    alone = sum(p for n, p in probability.items() if names[n] == named)
-    more = sum(p for n, p in probability.items() if named and named < names[n])
-    return alone, more, {n: p for n, p in probability.items() if not (named and named < names[n])}
+class Explanation(NamedTuple):
+    """An explanation of a study: keys joined by "+", none, or outside.
+
+    Attributes:
+      alone: its probability. more: of those that hold it and more, where it is named.
+      named: whether it is what the diagnosis names.
+    """
+
+    name: str
+    alone: float
+    more: float
+    named: bool
+
+
+def explanations(diagnosis: Diagnosis) -> list[Explanation]:
+    """What may explain a study, most probable first.
+
+    Explanations that hold the named effects and more count as one with the named effects.
+    """
+    keys = {e.key for e in diagnosis.effects}
+    named, more, out = "+".join(sorted(keys)), 0.0, []
+    for name, p in diagnosis.probability.items():
+        if keys and keys < set(name.split("+")):
+            more += p
+        elif name != named:
+            out.append(Explanation(name, p, 0.0, named=False))
+    if keys:
+        alone = diagnosis.probability.get(named, 0.0)
+        out.append(Explanation(named, alone, more, named=True))
+    return sorted(out, key=lambda e: -(e.alone + e.more))
 
 
 def hypothesis_words(name: str) -> str:

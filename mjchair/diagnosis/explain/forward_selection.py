@@ -45,9 +45,7 @@ def grown(fits: Fits) -> WithGap | None:
             break  # where no second effect stands beside the first, no third does
         here = _settled(fits, more)
         if size == 1:
-            if here[1].exists:
-                here = _settled(fits, better(here, left_over.of_size(fits, 1)) or here)
-            here = alternatives.or_whole(fits, here)
+            here = alternatives.or_whole(fits, _or_left_over(fits, here))
     return here
 
 
@@ -93,6 +91,14 @@ def beside(fits: Fits, best: Tried) -> WithGap | None:
     """
     with fits.near_to(best):
         return best_of(fits, promising(fits, best), patient=False)
+
+
+def _or_left_over(fits: Fits, here: WithGap) -> WithGap:
+    """The single effect, or a better one that was left over while the noise was sought."""
+    other = left_over.of_size(fits, 1) if here[1].exists else None
+    if other is None or other[0].price >= here[0].price:
+        return here
+    return _settled(fits, other)
 
 
 def _closes(more: WithGap | None, best: Tried) -> bool:

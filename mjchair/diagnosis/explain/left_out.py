@@ -155,6 +155,7 @@ def plain_gap(base: Base) -> Gap:
     What is only roughly known may take an effect for itself, and then foretells wrongly.
     """
     gap = confirmed(base, base.plain, gap_after(base, base.plain))
-    held = on_held_out(base, base.plain)
-    foretold = held is None or not rules.foretells_wrongly(held.before, held.dof)
-    return gap if foretold else replace(gap, exists=True)
+    held = held_windows(base)
+    if held.size and rules.foretells_wrongly(*_foretold(base, base.plain, held)):
+        return replace(gap, exists=True)
+    return gap

@@ -85,7 +85,7 @@ def _own_gain(fits: Fits, chosen: Tried, start: Start) -> float:
         return whole
     with fits.near_to(chosen):
         own = fits.weigh(starts).gain - fits.weigh(others).gain
-    # around a caster that is stuck, linear algebra does not see that it could turn without
+    # around a stuck caster, linear algebra does not see that it turns without the friction
     keys = {s.effect.key for s in others}
     without = [t.fitted.total for t in fits.tried if set(t.hypothesis.keys) == keys]
     own = max(own, min(without, default=-np.inf) - chosen.fitted.total)

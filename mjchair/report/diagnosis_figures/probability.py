@@ -5,11 +5,9 @@ In: a diagnosis. Out: a figure, or None where the diagnosis gives no probabiliti
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from mjchair.diagnosis.result import Diagnosis
 from mjchair.report.colours import AFTER, FAINT
-from mjchair.report.diagnosis_words import hypothesis_words, named_keys, with_more
+from mjchair.report.diagnosis_words import explanations, hypothesis_words
 from mjchair.report.figure import Figure
 
 MOST = 8  # bars; the rest is one more
@@ -22,20 +20,16 @@ def figure(diagnosis: Diagnosis) -> Figure | None:
     Explanations that hold what is named and more are one bar under it: together they are how
     probable it is that the named effects are there.
     """
-    probability: Mapping[str, float] | None = getattr(diagnosis, "probability", None)
-    if not probability:
+    if not diagnosis.probability:
         return None
-    named = named_keys(diagnosis)
-    _, more, others = with_more(probability, named)
-    ordered = sorted(others.items(), key=lambda item: -item[1])
-    shown = [(name, p) for name, p in ordered if p >= LEAST][:MOST]
+    shown = [e for e in explanations(diagnosis) if e.alone >= LEAST][:MOST]
     bars = []
-    for name, p in shown:
-        own = set(name.split("+")) == named
-        bars.append((hypothesis_words(name), p, AFTER if own else FAINT))
-        if own and more >= LEAST:
-            bars.append(("the same, and more", more, AFTER))
-    rest = sum(probability.values()) - sum(p for _, p, _ in bars)
+    for e in shown:
+        colour = AFTER if e.named else FAINT
+        bars.append((hypothesis_words(e.name), e.alone, colour))
+        if e.more >= LEAST:
+            bars.append(("the same, and more", e.more, colour))
+    rest = sum(diagnosis.probability.values()) - sum(p for _, p, _ in bars)
     if rest >= LEAST:
         bars.append(("everything else", rest, FAINT))
     names, values, colours = zip(*bars[::-1], strict=True)
