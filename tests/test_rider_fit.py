@@ -10,10 +10,11 @@ from five_segments import NOISE, Case, Hidden, tables
 import mjchair
 from mjchair.diagnosis.data.roughly_known import nuisances
 from mjchair.diagnosis.data.study import Run, make_study
+from mjchair.diagnosis.fit import bounded, nonlinear
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ParameterId, RoughlyKnown
 from mjchair.diagnosis.fit.nonlinear import refit
-from mjchair.diagnosis.fit.parameter_columns import nuisance_columns
+from mjchair.diagnosis.fit.parameter_columns import nuisance_columns, term_columns
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.replay import noise
 from mjchair.diagnosis.replay.derivatives import predictions
@@ -129,3 +130,37 @@ def test_a_body_at_rest_shakes_no_chair_and_one_that_moves_is_followed():
     # beyond its end a motion keeps its speed: a stop would be a blow
     after = motion.place_at(np.array([motion.time[-1], motion.time[-1] + 0.02]))
     assert np.diff(after)[0] == pytest.approx(0.02 * motion.start(motion.time[-1])[1])
+
+
+def test_the_chi2_of_a_variant_is_that_of_its_linear_system(push):
+    """It is known before the columns of its effects are made, with all else as it is."""
+    bench, first, moving = push
+    variant = replace(moving(60.0), offsets={"mass": 0.5, "centre_x": -1.0})
+    known = nuisance_columns(bench, first, variant)
+    here = nonlinear._placed(bench, variant, first, known)
+    end = nonlinear._around(bench, here, known)
+    outside = end.system.index(nonlinear._outside(bench, known))
+    total = bounded.solve_nuisances(end.system, bench.windows, outside)[1]
+    assert end.total == here.total == pytest.approx(total, rel=1e-12)
+
+
+def test_no_columns_are_made_of_steps_that_fail(push, monkeypatch):
+    """A body that moves 55 kg, and steps that are all made to fit worse than it."""
+    bench, first, moving = push
+    known = nuisance_columns(bench, first, moving(55.0))
+    placed, made, tried = nonlinear._placed, [], []
+
+    def worse(*args):
+        tried.append(args[1].terms[0].values["mass"])
+        here = placed(*args)
+        return here if len(tried) == 1 else replace(here, total=here.total + 1e6)
+
+    def columns(*args):
+        made.append(args[2].terms[0].values["mass"])
+        return term_columns(*args)
+
+    monkeypatch.setattr(nonlinear, "_placed", worse)
+    monkeypatch.setattr(nonlinear, "term_columns", columns)
+    end = nonlinear.refit(bench, moving(55.0), first, known)
+    assert end.variant.terms[0].values["mass"] == 55.0
+    assert len(tried) == 1 + nonlinear.FAILS and made == [55.0]

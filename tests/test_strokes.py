@@ -4,9 +4,15 @@ import numpy as np
 
 import mjchair
 from mjchair.diagnosis.data.study import Run, make_study
+from mjchair.diagnosis.fit.bench import Bench
+from mjchair.diagnosis.fit.parameter_columns import term_columns
+from mjchair.diagnosis.fit.variant import Term, Variant, nudged
 from mjchair.diagnosis.replay import noise, strokes
+from mjchair.diagnosis.replay.derivatives import predictions
+from mjchair.diagnosis.replay.sensor_errors import SensorErrors
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.diagnosis.replay.window_states import track
+from mjchair.effects import stroke_motion
 from mjchair.measurement.trial import Trial
 from mjchair.simulation.initial import Initial
 
@@ -70,3 +76,35 @@ def test_a_study_of_a_moving_rider_starts_and_goes_on_as_its_tables_say():
         )
     assert np.std(left["moving"]) < 0.02
     assert np.std(left["moving"]) < 0.1 * np.std(left["rigid"])
+
+
+def test_a_body_that_moves_in_step_with_strokes_changes_nothing_where_there_are_none():
+    """The windows of a coast are not simulated for it, and would show nothing if they were."""
+    spec = mjchair.load_spec("manual")
+    coast = Trial("coast", TIME, {"left_wheel_speed": np.ones(TIME.size)}, None, {})
+    runs = [
+        pushed(np.arange(1.0, 19.0)),
+        Run(coast, "coast", False, Initial(speed=1.0), frozenset()),
+    ]
+    simulator = WindowSimulator(make_study(spec, runs, {"left_wheel_speed": 0.01}), threads=1)
+    effect = stroke_motion.EFFECT.on(spec)
+    still = simulator.without_motion(effect.measured)
+    assert {simulator.windows[i].run for i in still} == {1}
+    assert len(still) == sum(w.run == 1 for w in simulator.windows)
+    assert simulator.without_motion(None) == frozenset()
+
+    swaying = dict.fromkeys(stroke_motion.WAVES, 0.0) | {"sine_1": 1.0}
+    variant = Variant((), terms=(Term(effect, swaying, ("sine_1",)),))
+    bench = Bench(simulator, noise.estimate(simulator.study), ())
+    here = track(simulator, simulator.compile(variant.edit), bench.noise)
+    (column,) = term_columns(bench, here, variant).values()
+    beside, _ = nudged(variant, variant.terms[0], effect.parameter("sine_1"))
+    errors = SensorErrors(simulator.channels)
+    model = simulator.compile(variant.edit)
+    rest = predictions(simulator, here, model, errors, coarse=True)
+    moved = predictions(simulator, here, simulator.compile(beside.edit), errors, coarse=True)
+    for i, (values, one, other) in enumerate(zip(column, rest, moved, strict=True)):
+        if i in still:
+            assert not values.any() and np.abs(other - one).max() < 1e-12
+        else:
+            assert np.abs(values).max() > 1e-3

@@ -77,7 +77,6 @@ def test_a_fit_takes_the_columns_that_an_effect_shares(monkeypatch):
     known = roughly_known.nuisances((), {})
     before = {RoughlyKnown(n.name): [np.ones((3, 1))] for n in known}
     answer = {ParameterId("mass_offset", "x"): [np.full((3, 1), 6.0)]}
-    monkeypatch.setattr(nonlinear, "track", lambda *_: SimpleNamespace(predicted=[np.zeros(3)]))
     monkeypatch.setattr(nonlinear, "term_columns", lambda *_: answer)
     asked = {}
 
@@ -85,10 +84,9 @@ def test_a_fit_takes_the_columns_that_an_effect_shares(monkeypatch):
         asked.update(columns)
         raise InterruptedError
 
-    simulator = SimpleNamespace(channels=("heading",), compile=lambda _: None)
-    bench = SimpleNamespace(simulator=simulator, noise={}, system=system)
+    here = nonlinear.Placed(Variant(known, terms=(term,)), SimpleNamespace(), 0.0)
     with pytest.raises(InterruptedError):
-        nonlinear._around(bench, Variant(known, terms=(term,)), None, before)
+        nonlinear._around(SimpleNamespace(system=system), here, before)
     assert asked[RoughlyKnown("centre_x")][0] == pytest.approx(6.0 * 0.01 / 0.03)
     assert asked[RoughlyKnown("centre_y")][0] == pytest.approx(1.0)
 
@@ -114,11 +112,12 @@ def test_a_fit_that_stays_worse_than_a_part_of_it_is_not_followed(most, looked, 
     """It comes down by 1 in every round, from 1000."""
     totals = iter(range(1000, 0, -1))
 
-    def around(*_):
+    def placed(*_):
         total = next(totals)
         return SimpleNamespace(total=float(total), promised=0.0, track=None, std={}, variant=None)
 
-    monkeypatch.setattr(nonlinear, "_around", around)
+    monkeypatch.setattr(nonlinear, "_placed", placed)
+    monkeypatch.setattr(nonlinear, "_around", lambda _, here, *__: here)
     monkeypatch.setattr(nonlinear, "_after_linear_step", lambda *_: None)
     monkeypatch.setattr(nonlinear, "_between", lambda *_: None)
     monkeypatch.setattr(nonlinear, "_nearer", lambda _, here, *__: here)
@@ -133,14 +132,15 @@ def test_a_start_that_fits_worse_than_a_part_of_its_effects_is_moved_towards_it(
     rolling = Term(library.find("rolling_resistance"), {"coefficient": 0.004}, ("coefficient",))
     tried = []
 
-    def around(bench, variant, *_):
+    def placed(bench, variant, *_):
         less = 1.0 - variant.terms[1].values["factor"]
         tried.append(round(less, 6))
         assert variant.terms[0].values["coefficient"] <= 0.005
         total = 1e6 if less > 0.2 else 100.0 - 50.0 * less
         return SimpleNamespace(total=total, promised=total, track=None, std={}, variant=variant)
 
-    monkeypatch.setattr(nonlinear, "_around", around)
+    monkeypatch.setattr(nonlinear, "_placed", placed)
+    monkeypatch.setattr(nonlinear, "_around", lambda _, here, *__: here)
     monkeypatch.setattr(nonlinear, "_after_linear_step", lambda _, best: best.variant)
     start = Variant(
         (),
@@ -159,7 +159,7 @@ def test_after_a_short_step_the_next_is_twice_as_long_and_not_whole(monkeypatch)
     """Every second round was lost on a whole step where only a fifth of one helped."""
     aim, tried = 10.0, []
 
-    def around(bench, variant, *_):
+    def placed(bench, variant, *_):
         at = variant.offsets.get("mass", 0.0)
         tried.append(at)
         step = aim - at
@@ -171,7 +171,8 @@ def test_after_a_short_step_the_next_is_twice_as_long_and_not_whole(monkeypatch)
         return SimpleNamespace(total=total, promised=100.0, track=None, std={}, variant=variant)
 
     best = [0.0]
-    monkeypatch.setattr(nonlinear, "_around", around)
+    monkeypatch.setattr(nonlinear, "_placed", placed)
+    monkeypatch.setattr(nonlinear, "_around", lambda _, here, *__: here)
     monkeypatch.setattr(
         nonlinear, "_after_linear_step", lambda *_: Variant((), offsets={"mass": aim})
     )

@@ -140,7 +140,7 @@ def _add_points(out: Candidates, around: Around, effect: Effect) -> None:
     first = len({start.group for start in out.starts if start.effect.key == effect.key})
     made = []
     for k, seed in enumerate(effect.starts()):
-        points = derivatives.effect_points(effect, seed)
+        points = derivatives.effect_points(simulator, effect, seed)
         columns = derivatives.differences(
             simulator, around.track, points, around.variant.edit, errors
         )

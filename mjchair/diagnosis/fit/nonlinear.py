@@ -12,8 +12,9 @@ neither converges.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +73,15 @@ class Fitted:
     at_least: dict[ParameterId, float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Placed:
+    """A variant with its track, and the chi2 of the windows fitted to, with priors."""
+
+    variant: Variant
+    track: Track
+    total: float
+
+
 def refit(
     bench: Bench,
     start: Variant,
@@ -100,10 +110,11 @@ def refit(
         model, errors = simulator.compile(start.edit), start.sensor_errors(simulator.channels)
         before = track(simulator, model, bench.noise, errors, before, anew=True)
         nuisances = nuisance_columns(bench, before, start)
-    best = _around(bench, start, before, nuisances)
+    here = _placed(bench, start, before, nuisances)
     most = np.inf if part is None else part.total
-    if part is not None and best.total > most:
-        best = _nearer(bench, best, part, before, nuisances)
+    if part is not None and here.total > most:
+        here = _nearer(bench, here, part, before, nuisances)
+    best = _around(bench, here, nuisances)
     variant = _after_linear_step(bench, best)
     share, fails = 1.0, 0  # of the linear step, that is tried
     for k in range(rounds):
@@ -112,18 +123,18 @@ def refit(
         if done or (k >= FEW and best.total > most):
             break
         try:
-            here = _around(bench, variant, best.track, nuisances, best.std)
-        except (MjchairError, np.linalg.LinAlgError):  # of a step to what no chair can be
-            shorter = SHORTER[1]
-        else:
+            here = _placed(bench, variant, best.track, nuisances)
             if here.total < best.total:
-                brought, best, fails = best.total - here.total, here, 0
-                if brought < 0.5 * DONE and here.total - here.promised < ROUGH:
+                brought, fails = best.total - here.total, 0
+                best = _around(bench, here, nuisances, best.std)
+                if brought < 0.5 * DONE and best.total - best.promised < ROUGH:
                     break
                 share = min(LONGER * share, 1.0)
-                variant = _between(here.variant, _after_linear_step(bench, here), share)
+                variant = _between(best.variant, _after_linear_step(bench, best), share)
                 continue
             shorter = _shorter(best, here.total, share)
+        except (MjchairError, np.linalg.LinAlgError):  # of a step to what no chair can be
+            shorter = SHORTER[1]
         fails += 1
         if share <= SHORTEST or fails == FAILS:
             break
@@ -134,11 +145,11 @@ def refit(
 
 def _nearer(
     bench: Bench,
-    here: Fitted,
+    here: Placed,
     part: Fitted,
     before: Track | None,
     nuisances: dict[ColumnId, Column],
-) -> Fitted:
+) -> Placed:
     """A place between a start and a part of its effects that fits as well as that, or the best.
 
     The size that linear algebra promises of an effect may be absurd: a tire without friction.
@@ -151,10 +162,10 @@ def _nearer(
     least, far = replace(here.variant, offsets=part.variant.offsets, terms=terms), here.variant
     for share in NEARER:
         try:
-            there = _around(bench, _between(least, far, share), before, nuisances)
+            there = _placed(bench, _between(least, far, share), before, nuisances)
         except (MjchairError, np.linalg.LinAlgError):  # of what no chair can be
             continue
-        here = min(here, there, key=lambda f: f.total)
+        here = min(here, there, key=attrgetter("total"))
         if here.total <= part.total:
             break
     return here
@@ -169,32 +180,51 @@ def _neutral(term: Term) -> Term:
     )
 
 
-def _around(
+def _placed(
     bench: Bench,
     variant: Variant,
     before: Track | None,
-    nuisances: dict[ColumnId, Column],
-    known: Mapping[ParameterId, float] | None = None,
-) -> Fitted:
-    """A variant as it is, and the linear system around it.
-
-    Args:
-      known: standard errors of the parameters in the fit before; None: there is none.
+    nuisances: Mapping[ColumnId, Column],
+) -> Placed:
+    """A variant as it is, with its chi2.
 
     Raises:
       MjchairError: it does not compile, or its simulation fails.
     """
     simulator = bench.simulator
     errors = variant.sensor_errors(simulator.channels)
-    model = simulator.compile(variant.edit)
-    here = track(simulator, model, bench.noise, errors, before)
+    here = track(simulator, simulator.compile(variant.edit), bench.noise, errors, before)
+    outside = {n: nuisances[n] for n in _outside(bench, nuisances)}
+    _check_finite([here.predicted, *outside.values()], variant)
+    system = bench.system(here, outside, len(outside), variant, only=bench.windows)
+    total = bounded.solve_nuisances(system, bench.windows, range(len(outside)))[1]
+    inside = set(map(RoughlyKnown, variant.offsets)) & (nuisances.keys() - outside.keys())
+    return Placed(variant, here, total + sum(variant.offsets[n.name] ** 2 for n in inside))
+
+
+def _around(
+    bench: Bench,
+    here: Placed,
+    nuisances: dict[ColumnId, Column],
+    known: Mapping[ParameterId, float] | None = None,
+) -> Fitted:
+    """The linear system around a variant.
+
+    Args:
+      known: standard errors of the parameters in the fit before; None: there is none.
+
+    Raises:
+      MjchairError: a variant beside it does not compile, or its simulation fails.
+    """
+    variant = here.variant
     columns = dict(nuisances)
     count = len(columns)
-    columns.update(term_columns(bench, here, variant, known))
+    columns.update(term_columns(bench, here.track, variant, known))
     columns.update(shared_columns(variant, columns))
-    _check_finite([here.predicted, *columns.values()], variant)
-    system = bench.system(here, columns, count, variant)
-    step, total = bounded.solve_nuisances(system, bench.windows, _outside(bench, system, count))
+    _check_finite(columns.values(), variant)
+    system = bench.system(here.track, columns, count, variant)
+    outside = system.index(_outside(bench, nuisances))
+    step, _ = bounded.solve_nuisances(system, bench.windows, outside)
     system.set_cells(step[:count])  # of this very variant: nothing else of it is moved
     covariance = bounded.covariance(system, bench.windows)
     std, bound = {}, []
@@ -207,12 +237,12 @@ def _around(
     terms = range(count, len(system.columns))
     return Fitted(
         variant=variant,
-        track=here,
+        track=here.track,
         columns=columns,
         system=system,
         step=step,
         chi2=np.array([bounded.chi2(system, i, step) for i in bench.windows]),
-        total=total,
+        total=here.total,
         promised=bounded.solve(system, bench.windows, terms)[1],
         std=std,
         sigmas={t.effect.key: _sigmas(t, system, covariance) for t in variant.terms},
@@ -220,17 +250,17 @@ def _around(
     )
 
 
-def _check_finite(columns: Sequence[Column], variant: Variant) -> None:
+def _check_finite(columns: Iterable[Column], variant: Variant) -> None:
     """Refuse a variant whose simulation fails."""
     if not all(np.isfinite(window).all() for column in columns for window in column):
         keys = " and ".join(t.effect.key for t in variant.terms) or "no effect"
         raise MjchairError(f"the chair with {keys} does not simulate: a prediction is not finite")
 
 
-def _outside(bench: Bench, system: System, count: int) -> list[int]:
-    """Places of the nuisances that stand in no variant, such as sensor biases."""
+def _outside(bench: Bench, nuisances: Iterable[ColumnId]) -> list[ColumnId]:
+    """The nuisances that stand in no variant, such as sensor biases."""
     inside = {RoughlyKnown(n.name) for n in bench.nuisances if n.edit is not None and not n.linear}
-    return [i for i, column in enumerate(system.columns[:count]) if column not in inside]
+    return [column for column in nuisances if column not in inside]
 
 
 def _on_bound(p: Parameter, value: float) -> bool:

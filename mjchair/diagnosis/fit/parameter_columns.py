@@ -92,14 +92,18 @@ def term_columns(
                 )
                 continue
             beside, factor = nudged(variant, term, parameter, (known or {}).get(key))
-            points[key] = Point(beside.edit, factor)
+            unchanged = simulator.without_motion(effect.measured)
+            points[key] = Point(beside.edit, factor, unchanged=unchanged)
     if points:
         # a point here is a whole chair, so nothing comes before its edit
         model = simulator.compile(variant.edit)
         base = derivatives.predictions(simulator, track, model, errors, coarse=True)
         for key, point in points.items():
             model = simulator.compile(point.edit)
-            edited = derivatives.predictions(simulator, track, model, errors, coarse=True)
+            same = {i: base[i] for i in point.unchanged}
+            edited = derivatives.predictions(
+                simulator, track, model, errors, coarse=True, known=same
+            )
             out[key] = [point.factor * (e - y) for e, y in zip(edited, base, strict=True)]
     return {key: out[key] for term in variant.terms for key, _ in term.parameters}
 

@@ -6,7 +6,7 @@ sample.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -31,12 +31,14 @@ class Point:
     Attributes:
       fine: whether it is compared at the fine step. whole: whether the edit makes the model of the
         study's chair by itself; False: on top of what the base has.
+      unchanged: windows in which it changes nothing, which are not simulated.
     """
 
     edit: Callable[[mujoco.MjSpec], None]
     factor: float = 1.0
     fine: bool = False
     whole: bool = False
+    unchanged: Collection[int] = ()
 
 
 def differences(
@@ -69,7 +71,8 @@ def differences(
 
             reference = track.predicted if point.fine else coarse
             model = simulator.compile(edit)
-            edited = predictions(simulator, track, model, seen, coarse=not point.fine)
+            known = {i: reference[i] for i in point.unchanged}
+            edited = predictions(simulator, track, model, seen, coarse=not point.fine, known=known)
             change = [point.factor * (e - y) for e, y in zip(edited, reference, strict=True)]
             columns.append(_unwrapped(simulator, change))
     return columns
@@ -82,21 +85,24 @@ def predictions(
     errors: SensorErrors,
     late: float = 0.0,
     coarse: bool = False,
+    known: Mapping[int, Array] | None = None,
 ) -> Column:
     """What a model predicts from the states of a track, with its inputs `late` (s).
 
     Args:
       coarse: whether at the coarse step, for differences; not so in windows that are touchy.
+      known: predictions of windows that are not simulated; None: of none.
     """
     rough = simulator.coarsened(model) if coarse else model
-    jobs = [
-        Job(model if i in track.touchy else rough, w, s, late=late)
+    out = dict(known or {})
+    jobs = {
+        i: Job(model if i in track.touchy else rough, w, s, late=late)
         for i, (w, s) in enumerate(zip(simulator.windows, track.states, strict=True))
-    ]
-    return [
-        errors.applied(simulator, w, o.predicted)
-        for w, o in zip(simulator.windows, simulator.run(jobs), strict=True)
-    ]
+        if i not in out
+    }
+    for i, outcome in zip(jobs, simulator.run(list(jobs.values())), strict=True):
+        out[i] = errors.applied(simulator, simulator.windows[i], outcome.predicted)
+    return [out[i] for i in range(len(simulator.windows))]
 
 
 def _unwrapped(simulator: WindowSimulator, column: Column) -> Column:
@@ -133,11 +139,14 @@ def sensor_column(
     return out
 
 
-def effect_points(effect: Effect, seed: Seed) -> list[Point]:
+def effect_points(simulator: WindowSimulator, effect: Effect, seed: Seed) -> list[Point]:
     """The models of a seed."""
+    unchanged = simulator.without_motion(effect.measured)
 
     def edit(values: Values) -> Callable[[mujoco.MjSpec], None]:
         return lambda spec: effect.apply(spec, values)
 
     factors = seed.factors or (1.0,) * len(seed.points)
-    return [Point(edit(v), f) for v, f in zip(seed.points, factors, strict=True)]
+    return [
+        Point(edit(v), f, unchanged=unchanged) for v, f in zip(seed.points, factors, strict=True)
+    ]

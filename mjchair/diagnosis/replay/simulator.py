@@ -142,6 +142,13 @@ class WindowSimulator:
         cut_damping(coarse, above=COMFORTABLE)
         return coarse
 
+    def without_motion(self, column: str | None) -> frozenset[int]:
+        """Windows of the runs that have no such motion, as where nobody pushes; None: none are."""
+        if column is None:
+            return frozenset()
+        still = {k for k, known in enumerate(self.motions) if column not in known}
+        return frozenset(i for i, w in enumerate(self.windows) if w.run in still)
+
     def input_step(self) -> float:
         """Median time between samples of the inputs, s; 0 where nothing is driven."""
         driven = [r.trial.inputs for r in self.study.runs if r.trial.inputs is not None]
