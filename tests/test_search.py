@@ -166,6 +166,36 @@ def test_a_fit_that_went_astray_begins_once_more_near_no_effect():
     assert here.values == pytest.approx({"x": 0.4, "y": -0.2, "drag_area": 0.9})
 
 
+def test_what_others_were_weighed_beside_is_not_fitted_with_them_from_afar(monkeypatch):
+    """The best is rolling and motor: with wind beside both, the algebra around it has decided."""
+    asked = []
+    with_wind = Hypothesis((ROLLING, MOTOR, WIND), gain=950.0, score=920.0)
+    two = Hypothesis((MOTOR, WIND), gain=940.0, score=915.0)
+    gap = SimpleNamespace(exists=True)
+
+    def believed(hypothesis, top):
+        asked.append(hypothesis.keys)
+        return SimpleNamespace(price=100.0, fitted=None)
+
+    fits = SimpleNamespace(believed=believed, gap_after=lambda _: gap)
+    monkeypatch.setattr(shortlist, "_first_few", lambda _, options: list(options))
+    assert shortlist.best_of(fits, [with_wind, two], but=BOTH.keys)[1] is gap
+    assert asked == [two.keys]
+    assert shortlist.best_of(fits, [with_wind], patient=False, but=BOTH.keys) is None
+    shortlist.best_of(fits, [with_wind, two])
+    assert asked[1:] == [with_wind.keys, two.keys]
+
+
+def test_a_fit_begins_once_where_more_effects_ended(monkeypatch):
+    made = []
+    monkeypatch.setattr(fits_of_hypotheses, "nuisances_of", lambda *_: {})
+    monkeypatch.setattr(fits_of_hypotheses, "made_anew", lambda *args: made.append(args))
+    search, more = searching(), fit(1000.0, "rolling", "motor")
+    for end in (more, more, fit(1000.0, "rolling", "motor")):
+        search.begin_at(ONE, end)
+    assert len(made) == 2
+
+
 def test_what_cannot_be_is_tried_once(fits):
     fits.answers[("rolling", "as given")] = None
     looking = searching()

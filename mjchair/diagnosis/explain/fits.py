@@ -39,6 +39,7 @@ class Fits:
       base: around which. say: is called with the name of a fit as it begins.
       tried: every fit that was made. impossible: starts of those that this chair cannot have.
       again: of some of them, the fit with everything made anew around it.
+      begun: effects whose fit began where more of them had ended, and that end.
       dropped: a line for each hypothesis that this chair cannot have.
       near: the linear algebra that weighs; None: that of the base. latest: the last around a fit.
     """
@@ -49,6 +50,7 @@ class Fits:
         self.tried: list[Tried] = []
         self.impossible: list[tuple[Start, ...]] = []
         self.again: list[Tried] = []
+        self.begun: list[tuple[tuple[Start, ...], Fitted]] = []
         self.dropped: list[str] = []
         self.near = near_fit(base, base.found) if base.found else None
         self.latest: NearFit | None = None
@@ -134,7 +136,11 @@ class Fits:
         """Make the fit of fewer effects from where more of them ended, if that can be.
 
         An effect that is hardly there may have helped the fit past the place where it was stuck.
+        It is made once.
         """
+        if any(starts == fewer.starts and end is more for starts, end in self.begun):
+            return
+        self.begun.append((fewer.starts, more))
         keys = set(fewer.keys)
         terms = tuple(t for t in more.variant.terms if t.effect.key in keys)
         start, columns = replace(more.variant, terms=terms), nuisances_of(self.base, more)

@@ -71,39 +71,45 @@ def promising(fits: Fits, best: Tried) -> list[Hypothesis]:
     ]
 
 
-def best_of(fits: Fits, options: Sequence[Hypothesis], patient: bool = True) -> WithGap | None:
+def best_of(
+    fits: Fits, options: Sequence[Hypothesis], patient: bool = True, but: Collection[str] = ()
+) -> WithGap | None:
     """The best hypothesis with its fit, and the gap that it leaves; None: none can be.
 
     Where the first leaves a gap, the linear order may be wrong, and the next are fitted too.
 
     Args:
       patient: whether, where none of these can be, the list is gone on along.
+      but: effects that a hypothesis may not have all; none: it may be any.
     """
     if not options or options[0].score <= 0.0:
         return None
+    listed = [h for h in _first_few(fits, options) if not but or not set(but) <= set(h.keys)]
+    top = left = None
+    for k, h in enumerate(listed):
+        more = fits.believed(h, top)
+        if more is not None and (top is None or more.price < top.price):
+            top, left = more, None
+        if top is not None and k == 0:
+            left = fits.gap_after(top.fitted)
+            if not left.exists:
+                return top, left
+    if top is None and patient:  # favourites that cannot be say nothing of the others
+        believed = (fits.believed(other) for other in options[:LISTED])
+        top = next((fit for fit in believed if fit is not None), None)
+    return None if top is None else (top, left or fits.gap_after(top.fitted))
+
+
+def _first_few(fits: Fits, options: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The hypotheses that are fitted: the best, and those that may be as good."""
     first = _commonest(fits, options)
-    top = fits.believed(first)
-    if top is not None:
-        left = fits.gap_after(top.fitted)
-        if not left.exists:
-            return top, left
     near = [
         h
         for h in options
         if h.keys != first.keys
         and rules.worth_trying(score=h.score, best=first.score, gain=first.gain)
     ]
-    tried = top
-    for other in near[: TRIED - 1]:
-        more = fits.believed(other, top)
-        if more is not None and (top is None or more.price < top.price):
-            top = more
-    if top is None and patient:  # favourites that cannot be say nothing of the others
-        believed = (fits.believed(other) for other in options[:LISTED])
-        top = next((fit for fit in believed if fit is not None), None)
-    if top is None:
-        return None
-    return top, left if top is tried else fits.gap_after(top.fitted)
+    return [first, *near[: TRIED - 1]]
 
 
 def better(one: WithGap | None, other: WithGap | None) -> WithGap | None:
