@@ -15,6 +15,7 @@ from mjchair.diagnosis.fit.parameter_columns import shared_columns
 from mjchair.diagnosis.fit.system import taken_whole
 from mjchair.diagnosis.fit.variant import LEAST, NUDGE, Term, Variant, nudged
 from mjchair.effects import library, mass_offset, wheel_radius
+from mjchair.errors import MjchairError
 
 LEFT = wheel_radius.EFFECT.parameter("left")  # 3 mm is worth finding, 50 mm the bound
 
@@ -179,6 +180,27 @@ def test_after_a_short_step_the_next_is_twice_as_long_and_not_whole(monkeypatch)
     found = nonlinear.refit(SimpleNamespace(simulator=None), Variant(()), None, {})
     failed = sum(t not in best for t in tried)
     assert failed <= 4 and found.total < 105.0
+
+
+def test_a_better_place_beside_which_no_chair_can_be_is_a_step_that_failed(monkeypatch):
+    """Each step would fit better, but its columns cannot be made: after FAILS of them it ends."""
+    totals = iter(range(1000, 0, -1))
+    start = SimpleNamespace(total=1000.0, promised=0.0, track=None, std={}, variant=None)
+
+    def placed(*_):
+        return SimpleNamespace(total=float(next(totals)))
+
+    def around(bench, here, *_):
+        if here.total < 1000.0:
+            raise MjchairError("no chair")
+        return start
+
+    monkeypatch.setattr(nonlinear, "_placed", placed)
+    monkeypatch.setattr(nonlinear, "_around", around)
+    monkeypatch.setattr(nonlinear, "_after_linear_step", lambda *_: None)
+    monkeypatch.setattr(nonlinear, "_between", lambda *_: None)
+    assert nonlinear.refit(SimpleNamespace(simulator=None), None, None, {}) is start
+    assert next(totals) == 1000 - 1 - nonlinear.FAILS
 
 
 @pytest.mark.parametrize(

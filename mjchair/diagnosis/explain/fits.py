@@ -39,7 +39,7 @@ class Fits:
       base: around which. say: is called with the name of a fit as it begins.
       tried: every fit that was made. impossible: starts of those that this chair cannot have.
       again: of some of them, the fit with everything made anew around it.
-      begun: effects whose fit began where more of them had ended, and that end.
+      begun: for each fit that began where one of more effects had ended: its effects, and that end.
       dropped: a line for each hypothesis that this chair cannot have.
       near: the linear algebra that weighs; None: that of the base. latest: the last around a fit.
     """
@@ -136,7 +136,7 @@ class Fits:
         """Make the fit of fewer effects from where more of them ended, if that can be.
 
         An effect that is hardly there may have helped the fit past the place where it was stuck.
-        It is made once.
+        A fit of the same effects from the same end is made once.
         """
         if any(starts == fewer.starts and end is more for starts, end in self.begun):
             return

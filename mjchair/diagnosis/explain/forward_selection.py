@@ -76,7 +76,8 @@ def further(fits: Fits, best: Tried | None, size: int) -> WithGap | None:
     top = None if best is None else better(beside(fits, best), left_over.of_size(fits, size))
     if best is not None and _closes(top, best):
         return top
-    # perhaps the first effect stands in for two others; with it, others were weighed beside it
+    # Perhaps the first effect stands in for two others. Hypotheses that keep all effects of the
+    # best are not fitted again here: they were weighed around its fit.
     but = () if best is None else best.hypothesis.keys
     return better(top, best_of(fits, of_size(fits, size), patient=best is None, but=but))
 

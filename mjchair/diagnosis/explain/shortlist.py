@@ -80,17 +80,17 @@ def best_of(
 
     Args:
       patient: whether, where none of these can be, the list is gone on along.
-      but: effects that a hypothesis may not have all; none: it may be any.
+      but: effects; a hypothesis that has all of them is not fitted. Empty: any may be fitted.
     """
     if not options or options[0].score <= 0.0:
         return None
     listed = [h for h in _first_few(fits, options) if not but or not set(but) <= set(h.keys)]
     top = left = None
-    for k, h in enumerate(listed):
+    for h in listed:
         more = fits.believed(h, top)
         if more is not None and (top is None or more.price < top.price):
             top, left = more, None
-        if top is not None and k == 0:
+        if top is not None and h is listed[0]:
             left = fits.gap_after(top.fitted)
             if not left.exists:
                 return top, left

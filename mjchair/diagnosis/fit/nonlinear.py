@@ -125,8 +125,8 @@ def refit(
         try:
             here = _placed(bench, variant, best.track, nuisances)
             if here.total < best.total:
-                brought, fails = best.total - here.total, 0
-                best = _around(bench, here, nuisances, best.std)
+                brought = best.total - here.total
+                best, fails = _around(bench, here, nuisances, best.std), 0
                 if brought < 0.5 * DONE and best.total - best.promised < ROUGH:
                     break
                 share = min(LONGER * share, 1.0)

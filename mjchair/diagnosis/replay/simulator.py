@@ -143,7 +143,11 @@ class WindowSimulator:
         return coarse
 
     def without_motion(self, column: str | None) -> frozenset[int]:
-        """Windows of the runs that have no such motion, as where nobody pushes; None: none are."""
+        """Windows of the runs without a motion of this name, such as coasts.
+
+        Args:
+          column: name of the motion; None: no motion is asked for, and there is no such window.
+        """
         if column is None:
             return frozenset()
         still = {k for k, known in enumerate(self.motions) if column not in known}
