@@ -10,8 +10,8 @@ its sealed answer. Frames are those of ISO 8855; all numbers are SI.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 
@@ -19,7 +19,8 @@ import numpy as np
 from generator import MANOEUVRES, SEAL, Case, Manoeuvre, _write, scaled, seal
 from numba import njit
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, cho_factor, cho_solve
+from scipy.linalg import block_diag
+from scipy.optimize import least_squares
 from scipy.signal import butter, filtfilt
 
 Array = NDArray[np.float64]
@@ -80,6 +81,12 @@ JOINT = 0.02  # slope of a joint of the floor
 COLOUR = 0.25  # s, correlation time of what pushes and twists the chair
 GAIN = 0.01  # standard deviation of a sensor's gain
 GAINED = ("speed", "gyro", "accel")  # of sensors whose names hold one of these
+COUNTED = ("angle", "position.x", "position.y", "heading")  # channels that no start afresh ties
+ENCODER = 0.004  # rad, once a turn
+ROUGHLY = {  # of any chair, as documented: factors, and lengths in m
+    "mass": 0.05, "yaw_inertia": 0.10, "wheel_inertia": 0.05, "rear_stiffness": 0.07,
+    "caster_stiffness": 0.07, "com_x": 0.01, "com_y": 0.002, "com_z": 0.03, "radius": 0.0015,
+}  # fmt: skip
 BIAS = {"imu_gyro.z": 0.003, "imu_accelerometer.x": 0.05}  # as documented, of calibrated sensors
 
 (
@@ -467,7 +474,7 @@ def sense(
     for name, values in truth.items():
         raw = values.copy()
         if name.endswith("_angle"):  # the encoder sits off centre: once a turn
-            raw = raw + 0.004 * np.sin(raw)
+            raw = raw + ENCODER * np.sin(raw)
         std = kind.noise[name]
         raw = raw + std * np.sqrt(FINE / RATE) * rng.standard_normal(raw.size) * 0.5
         if "speed" in name or "position" in name or "heading" in name:
@@ -486,9 +493,8 @@ def sense(
     return table_time, out
 
 
-def _runs(case: Case, seed: int, which: tuple[int, ...], seconds: float) -> list[dict[str, Array]]:
-    """Exact channels of some trials."""
-    c = chair(np.random.default_rng([seed, 2]), case.hidden)
+def _runs(c: Chair, seed: int, which: tuple[int, ...], seconds: float) -> list[dict[str, Array]]:
+    """Exact channels of some trials of a chair."""
     return [exact(c, *drive(c, MANOEUVRES[k], seconds, 1000 * seed + k)[:2]) for k in which]
 
 
@@ -496,22 +502,27 @@ def _parts(run: dict[str, Array], noise: dict[str, float], afresh: bool = True) 
     """All channels of a run over their noise, averaged in steps of 0.1 s.
 
     Args:
-      afresh: each 2 s is taken less a line, since a window may start from another state.
+      afresh: each 2 s is taken less a line, since a window may start from another state; else what
+        is counted from a start (angles, places) is taken less its mean, and all else as it is.
     """
     out = []
     width = int(FINE / 10)
     for name, std in noise.items():
+        order = 1 if afresh else (0 if name.endswith(COUNTED) else None)
         x = run[name][: len(run[name]) // width * width].reshape(-1, width).mean(axis=1)
         for first in range(0, x.size, 20):
             part = x[first : first + 20]
             t = np.arange(part.size)
-            if afresh and part.size > 3:
-                part = part - np.polyval(np.polyfit(t, part, 1), t)
+            if order is not None and part.size > 3:
+                part = part - np.polyval(np.polyfit(t, part, order), t)
             out.append(part / (std / np.sqrt(width * RATE / FINE)))
     return np.concatenate(out)
 
 
 HAT = 0.2  # s, half the width of the triangles of force that a disturbance is made of
+SLOPE = 0.1  # standard deviations of a roughly known number, over which slopes are taken
+WALL = 3.0  # of them: further away a study is wrong about its chair
+FITTED = 8  # chairs at most that are tried in one fit
 SMALL = 0.3  # N and N m of them: small enough to add up
 
 
@@ -530,7 +541,7 @@ class Answers:
 
 
 @cache
-def answers(manoeuvre: int, seconds: float) -> Answers:
+def answers(manoeuvre: int, seconds: float, afresh: bool = True) -> Answers:
     """Simulated once for each manoeuvre, one triangle of force and one ripple after the other."""
     man, noise = MANOEUVRES[manoeuvre], Senses({}, 0.0, {}).noise
     p = np.array([*CHAIR.values(), *(0.0 for _ in HIDDEN)])
@@ -540,7 +551,7 @@ def answers(manoeuvre: int, seconds: float) -> Answers:
 
     def parts(push: Array, waves: Array, joints: float = 0.0) -> Array:
         states = integrate(first, time.size, p, waves, joints, 1.0 / FINE, torque, push)
-        return _parts(exact(Chair(p, waves, joints, 0.0, 0.0), time, states), noise)
+        return _parts(exact(Chair(p, waves, joints, 0.0, 0.0), time, states), noise, afresh)
 
     still, level = np.zeros((time.size, 2)), np.zeros((1, 4))
     plain = parts(still, level)
@@ -559,28 +570,44 @@ def answers(manoeuvre: int, seconds: float) -> Answers:
     return Answers(*moved, np.array(floor).T)
 
 
-def _disturbances(c: Chair, which: tuple[int, ...], seconds: float) -> Array:
+def _disturbances(c: Chair, which: tuple[int, ...], seconds: float, afresh: bool) -> Array:
     """Columns (samples of all trials, k) of one standard deviation of what disturbs a chair.
 
     Pushes and twists are each trial's own; the floor is one.
     """
-    known = [answers(k, seconds) for k in which]
+    known = [answers(k, seconds, afresh) for k in which]
     own = [np.hstack([c.push * a.pushes, c.twist * a.twists]) for a in known]
     return np.hstack([block_diag(*own), np.vstack([a.floor for a in known])])
 
 
+def _moved(p: Array, numbers: Array) -> Array:
+    """The numbers of a chair whose roughly known ones are off by as many standard deviations."""
+    out = p.copy()
+    for (name, std), off in zip(ROUGHLY.items(), numbers, strict=True):
+        if name == "radius":  # of both wheels: pressure and load change it
+            out[[R_LEFT, R_RIGHT]] += std * off
+        elif name.startswith("com"):
+            out[PLACE[name]] += std * off
+        else:
+            out[PLACE[name]] *= 1.0 + std * off
+    return out
+
+
 def _sensed(right: Sequence[dict[str, Array]], noise: dict[str, float], faulty: bool) -> Array:
-    """Columns of one standard deviation of what is roughly known of sensors: gains, and biases.
+    """Columns of one standard deviation of errors of sensors: gains, biases, once a turn.
 
     Args:
       faulty: for what sets one channel against another, which no start afresh every 2 s hides.
     """
-    errors = [(n, GAIN, 0.0) for n in noise if _has_gain(n)] + [
-        (n, 0.0, b) for n, b in BIAS.items()
+    angles = [n for n in noise if n.endswith("_angle")]
+    errors: list[tuple[str, Callable[[Array], Array]]] = [
+        *((n, lambda x: GAIN * x) for n in noise if _has_gain(n)),
+        *((n, lambda x, b=b: np.full_like(x, b)) for n, b in BIAS.items()),
+        *((n, lambda x, wave=wave: ENCODER * wave(x)) for n in angles for wave in (np.sin, np.cos)),
     ]
     out = []
-    for name, gain, bias in errors:
-        error = [{**r, name: gain * r[name] + bias} for r in right]
+    for name, of in errors:
+        error = [{**r, name: of(r[name])} for r in right]
         parts = [_parts(e, {name: noise[name]}, not faulty) for e in error]
         at = list(noise).index(name)
         whole = [np.zeros((len(noise), p.size)) for p in parts]
@@ -594,32 +621,68 @@ def size(case: Case, seed: int, which: tuple[int, ...], seconds: float) -> None:
     """Scale what is hidden until it shows at about case.sigma of the whole noise.
 
     The whole noise is the sensors', what pushes and twists the chair, a floor like its own, and
-    what is roughly known of the sensors.
+    what is only roughly known of the chair and of the sensors.
     """
     noise = Senses({}, 0.0, {}).noise
     sensor = any(name.startswith("sensor") for name in case.hidden)
     faulty = sensor or "wheel_radius" in case.hidden
-    right = _runs(Case("none"), seed, which, seconds)
-    plain = np.concatenate([_parts(r, noise, not faulty) for r in right])
     c = chair(np.random.default_rng([seed, 2]), {})
-    free = np.hstack([_disturbances(c, which, seconds), _sensed(right, noise, faulty)])
-    inner = cho_factor(np.eye(free.shape[1]) + free.T @ free)
+    right = _runs(c, seed, which, seconds)
+    free = np.hstack([_disturbances(c, which, seconds, not faulty), _sensed(right, noise, faulty)])
+    u, s, _ = np.linalg.svd(free, full_matrices=False)
+    shrink = u * (1.0 - 1.0 / np.sqrt(1.0 + s**2))  # (I + F F')^-1/2 is I - shrink u'
+
+    def seen(runs: Sequence[dict[str, Array]]) -> Array:
+        parts = np.concatenate([_parts(r, noise, not faulty) for r in runs])
+        return parts - shrink @ (u.T @ parts)
+
+    def without(numbers: Array) -> Array:
+        return seen(_runs(replace(c, p=_moved(c.p, numbers)), seed, which, seconds))
+
+    numbers = np.zeros(len(ROUGHLY))
     for name in case.hidden:
         first, factor = dict(case.hidden[name]), 1.0
-        for _ in range(6):
+        low, high = 0.0, np.inf
+        for _ in range(8):
             case.hidden[name] = scaled(first, name, factor)
             if sensor:
                 runs = [_faulty(case, r) for r in right]
             else:
-                runs = _runs(Case("one", {name: case.hidden[name]}), seed, which, seconds)
-            moved = np.concatenate([_parts(r, noise, not faulty) for r in runs]) - plain
-            along = free.T @ moved  # (I + F F')^-1 by Woodbury
-            left = moved @ moved - along @ cho_solve(inner, along)
-            case.reached[name] = float(np.sqrt(max(left, 0.0)))
+                other = chair(np.random.default_rng([seed, 2]), {name: case.hidden[name]})
+                runs = _runs(other, seed, which, seconds)
+            case.reached[name], found = _left(seen(runs), without, numbers)
             by = case.sigma / max(case.reached[name], 1e-6)
-            if 0.8 < by < 1.25:
-                break
-            factor *= float(np.clip(by, 0.05, 8.0))
+            if 0.8 < by < 1.25 or scaled(first, name, 1.2 * factor) == case.hidden[name]:
+                break  # or the largest size is reached
+            if by > 1.0:  # larger sizes are fitted from here
+                low, numbers = max(low, factor), found
+            else:
+                high = min(high, factor)
+            factor *= float(np.clip(by, 0.05, 3.0))
+            if not low < factor < high:
+                factor = float(np.sqrt(max(low, 0.01 * high) * high))
+
+
+def _left(seen: Array, without: Callable[[Array], Array], first: Array) -> tuple[float, Array]:
+    """What is left of runs, in sigmas, once a chair without the effect is fitted; its numbers.
+
+    The fit is no linear one: a turn answers to a centre of mass 20 mm ahead in another way than
+    twice to 10 mm.
+
+    Args:
+      seen: whitened samples. without: numbers in standard deviations -> samples. first: numbers.
+    """
+
+    def miss(numbers: Array) -> Array:
+        return np.concatenate([without(numbers) - seen, numbers])
+
+    def slopes(numbers: Array) -> Array:
+        here = miss(numbers)
+        steps = SLOPE * np.eye(numbers.size)
+        return np.column_stack([(miss(numbers + step) - here) / SLOPE for step in steps])
+
+    found = least_squares(miss, 0.99 * first, slopes, (-WALL, WALL), max_nfev=FITTED)
+    return float(np.sqrt(2.0 * found.cost)), found.x
 
 
 def _faulty(case: Case, run: dict[str, Array]) -> dict[str, Array]:
