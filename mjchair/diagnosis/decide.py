@@ -28,6 +28,7 @@ from mjchair.diagnosis.explain.left_out import (
     slow_part,
 )
 from mjchair.diagnosis.explain.probability import of_any, of_effects, probabilities
+from mjchair.diagnosis.explain.rivals import with_probable
 from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import ParameterId
@@ -64,6 +65,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     """What the stages say together."""
     closed = closure(gap, base, choice.fitted, choice.after) if choice else 0.0
     probability = probabilities(base, choice)
+    choice = with_probable(choice, probability) if choice else None
     stands = standing(base, choice, closed, probability) if choice else None
     said = rules.verdict(gap.exists, stands)
     forces = missing_forces(base)
@@ -212,6 +214,10 @@ def _following(base: Base, said: Verdict, plan: Plan | None, left: list[MissingF
         return wording.deciding(plan, base.bench.simulator)
     if said == Verdict.UNKNOWN:
         return wording.searching([(force.goes_with, force.sigmas) for force in left])
+    if said == Verdict.NONE:
+        moved = base.plain.variant.offsets
+        known = [(n, moved.get(n.name, 0.0)) for n in base.bench.nuisances]
+        return wording.measuring([(n, by) for n, by in known if rules.is_far(by)])
     return ""
 
 

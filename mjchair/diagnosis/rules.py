@@ -21,6 +21,8 @@ CLOSES = 0.8  # share of the excess that a named effect closes
 PARTLY = 0.5  # share that an effect closes which is part of an answer, with a remainder
 CARRIED = 0.5  # share of the excess on held-out trials that it closes there
 PROBABLE = 0.95  # probability of a named effect
+FAR = 2.5  # standard deviations: what is only roughly known and was moved as far is measured
+SHOWN = 0.1  # probability of what is shown as a rival whatever its chi2
 LIKELY = 0.5  # probability of an answer to a residual that is no more than noise
 HELD = 10.0  # chi2 that it must bring on runs that it was not fitted to
 SIGMAS = 4.0  # standard errors of a parameter away from neutral
@@ -450,6 +452,19 @@ def out_of_reach(*, promised: float, best: float, gain: float) -> bool:
 def not_ruled_out(*, gain: float) -> float:
     """Chi2 by which a fit may be worse and yet as good as another that brings `gain`."""
     return max(RIVAL_CHI2, FORM * gain)
+
+
+def is_far(by: float) -> bool:
+    """Whether what is only roughly known was moved far, by this many standard deviations.
+
+    Of ten numbers that are as the study says, one is moved as far in one study of eight.
+    """
+    return abs(by) >= FAR
+
+
+def is_shown(probability: float) -> bool:
+    """Whether a hypothesis is probable enough to be shown as a rival, whatever its chi2."""
+    return probability >= SHOWN
 
 
 def stays_a_rival(*, behind: float, gain: float, errors: float, beyond_bound: bool) -> bool:

@@ -18,6 +18,7 @@ from mjchair.measurement.sensors import sensor
 from mjchair.model import parts
 from mjchair.simulation.channels import TIRE
 
+COUNTED = 0.2  # how often a scale is wrong that counts or is calibrated, over others (assumption)
 COMPONENTS = {".x": 0, ".y": 1, ".z": 2} | {f".{part}": k for k, (part, _) in enumerate(TIRE)}
 
 
@@ -100,7 +101,14 @@ def sensor_effects(channel: str) -> tuple[Effect, ...]:
             "sensor_bias", (bias,), signature, source, _bias(channel), channel, SensorError.BIAS
         ),
         Effect(
-            "sensor_scale", (scale,), signature, source, _scale(channel), channel, SensorError.SCALE
+            "sensor_scale",
+            (scale,),
+            signature,
+            source,
+            _scale(channel),
+            channel,
+            SensorError.SCALE,
+            common=1.0 if kind.gain else COUNTED,
         ),
     ]
     if not split(channel)[0].endswith("_tire"):

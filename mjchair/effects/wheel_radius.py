@@ -23,5 +23,6 @@ EFFECT = Effect(
     signature="encoder and motion disagree, in proportion to v",
     source="a 24-inch tire is 1-3 mm smaller at half pressure; assumed",
     edit=edit,
+    common=2.0,
     shared={"rolling_radius": ("left", "right")},
 )

@@ -6,7 +6,7 @@ that one which the data do not rule out.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ import numpy as np
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain.backward_elimination import without_needless
 from mjchair.diagnosis.explain.candidates import Start
-from mjchair.diagnosis.explain.choice import Tried, is_there
+from mjchair.diagnosis.explain.choice import Choice, Tried, is_there
 from mjchair.diagnosis.explain.fits import Fits, believable
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.screening import gain
@@ -140,6 +140,26 @@ def _in_place_of(
     ]
     best = {frozenset(t.hypothesis.keys): t for t in sorted(fits, key=lambda t: -t.price)}
     return list(best.values())
+
+
+def with_probable(choice: Choice, probability: Mapping[str, float]) -> Choice:
+    """The choice with the rivals besides that were fitted and have a probability worth showing.
+
+    Chi2 may rule out what is only a little wrong in its form; how probable it is counts that in.
+
+    Args:
+      probability: of hypotheses, by their keys joined by "+".
+    """
+    likely = [
+        t
+        for t in choice.tried
+        if rules.is_shown(probability.get("+".join(t.hypothesis.keys), 0.0)) and is_there(t.fitted)
+    ]
+    out = []
+    for start, rivals in zip(choice.hypothesis.starts, choice.rivals, strict=True):
+        known = [r.hypothesis.keys for r in rivals]
+        out.append([*rivals, *_in_place_of(likely, choice.hypothesis, start, known)])
+    return replace(choice, rivals=out)
 
 
 def _not_ruled_out(rival: Tried, chosen: Tried, brought: float) -> bool:

@@ -120,7 +120,7 @@ def screen_columns(
     if _farthest(plain) > NEAR:
         plain = refit(bench, plain.variant, plain.track)
     # a nuisance far from its prior stands in for something else: then the chair as given is nearer
-    if _farthest(plain) < FAR:
+    if not rules.is_far(_farthest(plain)):
         variant, here, nuisances = plain.variant, plain.track, plain.columns
     around = Around(bench=bench, track=here, variant=variant, pulses=asked, answers=answers)
     tried = candidates.collect(around, effects, lambda key: say(f"effect {key}"))

@@ -1,6 +1,6 @@
 """The next experiment in words: what to do, what it decides, and what to look for.
 
-In: a `Plan`, or what a missing force goes with. Out: sentences.
+In: a `Plan`, what a missing force goes with, or what the fit moved far. Out: sentences.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from mjchair.diagnosis.data.roughly_known import Nuisance
 from mjchair.diagnosis.explain.column_ids import Driver, Quantity
 from mjchair.diagnosis.next_experiment.design import ENOUGH, PLENTY, Evidence, Plan
 from mjchair.diagnosis.replay.simulator import WindowSimulator
@@ -95,6 +96,41 @@ def _again(plan: Plan) -> list[str]:
 
 def _lower(words: str) -> str:
     return words[0].lower() + words[1:]
+
+
+# what is only roughly known of a chair, as a person would measure it
+MEASURED = {
+    "mass": "the mass of chair and person together",
+    "inertia": "the inertia of chair and person about the vertical",
+    "centre_x": "how far forward the centre of mass is (weigh the casters)",
+    "centre_y": "how far to the left the centre of mass is (weigh the left wheels)",
+    "centre_z": "how high the centre of mass is",
+    "rear_stiffness": "the cornering stiffness of the rear tires",
+    "caster_stiffness": "the cornering stiffness of the casters' tires",
+    "rolling_radius": "the radius of the rear wheels, loaded and rolling",
+    "torque": "the gain of the torques",
+}
+
+
+def measuring(moved: Sequence[tuple[Nuisance, float]]) -> str:
+    """What to measure where runs are explained by a chair that is far from what the study says.
+
+    Args:
+      moved: what is only roughly known, and by how many of its standard deviations it was moved,
+        of those that are far; empty where none is.
+    """
+    said = []
+    for n, by in moved:
+        unit = "" if n.unit == "1" else f" {n.unit}"
+        size = f"{100.0 * by * n.std:+.0f} %" if n.unit == "1" else f"{by * n.std:+.2g}{unit}"
+        said.append(f"{MEASURED.get(n.name, plain(n.name))}: {size}, {abs(by):.1f} sigmas")
+    if not said:
+        return ""
+    return (
+        f"Measure what these runs put far from what the study says: {'; '.join(said)}. Write what "
+        "you find into study.toml and diagnose again: if it is as the study says now, something "
+        "else is missing, and then it shows."
+    )
 
 
 WHEEL = (
