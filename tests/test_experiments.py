@@ -10,6 +10,7 @@ from noisy_run import NOISE, noisy_run
 
 import mjchair
 from mjchair.diagnosis import diagnose
+from mjchair.diagnosis.data.roughly_known import MECHANICAL
 from mjchair.diagnosis.data.study import make_study
 from mjchair.diagnosis.explain.candidates import Around, collect
 from mjchair.diagnosis.explain.column_ids import Driver, Quantity
@@ -282,3 +283,12 @@ def test_the_words_say_what_to_do_and_what_to_see(one_way):
 def test_an_unknown_force_is_looked_for_where_it_goes(tied, word):
     assert word in wording.searching([(tied, 9.0)])
     assert wording.searching([]) == wording.OTHERWISE
+
+
+def test_what_was_moved_far_is_to_be_measured():
+    """A scrub of 2 N m in one turn passes for a centre of mass 27 mm further forward."""
+    known = {n.name: n for n in MECHANICAL}
+    said = wording.measuring([(known["centre_x"], 2.7), (known["inertia"], -2.5)])
+    assert "weigh the casters): +0.027 m, 2.7 sigmas" in said
+    assert "-25 %, 2.5 sigmas" in said
+    assert wording.measuring([]) == ""

@@ -364,6 +364,17 @@ def test_what_keeps_a_rival(behind, gain, errors, beyond, stays):
     assert kept == stays
 
 
+def test_what_is_probable_is_shown_as_a_rival():
+    assert rules.is_shown(0.10)
+    assert not rules.is_shown(0.09)
+
+
+def test_what_was_moved_far_is_measured_to_either_side():
+    assert rules.is_far(-2.6)
+    assert rules.is_far(2.5)
+    assert not rules.is_far(2.4)
+
+
 def test_paired_errors_count_windows_not_samples():
     rng = np.random.default_rng(0)
     ours = rng.uniform(50.0, 150.0, 40)

@@ -307,6 +307,19 @@ def test_a_rival_takes_the_place_only_once_both_are_made_anew(rival, takes, fits
     assert best.hypothesis is (motor if takes else ONE)
 
 
+def test_what_was_fitted_and_is_probable_stands_in_the_set():
+    """A wheel radius that chi2 rules out by its form, with 17 %, beside an encoder's scale."""
+    motor, wind = Hypothesis((MOTOR,), 500.0, 490.0), Hypothesis((WIND,), 400.0, 390.0)
+    bare = Variant(())
+    tried = [Tried(h, SimpleNamespace(total=1e3, variant=bare)) for h in (ONE, motor, wind)]
+    choice = SimpleNamespace(hypothesis=ONE, rivals=[[]], tried=tried)
+    with mock.patch.object(rivals, "replace", lambda _, rivals: rivals):
+        found = rivals.with_probable(choice, {"rolling": 0.6, "motor": 0.17, "wind": 0.09})
+        assert [[r.hypothesis.keys for r in group] for group in found] == [[("motor",)]]
+        choice.rivals = [[tried[1]]]  # it is there once
+        assert rivals.with_probable(choice, {"motor": 0.17}) == [[tried[1]]]
+
+
 @pytest.mark.parametrize("alone", [None, 1500.0])
 def test_an_effect_brings_what_the_others_lose_without_it(alone, monkeypatch):
     """Around a caster that is stuck linear algebra says that nothing is lost if it is free."""
