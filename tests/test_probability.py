@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -341,3 +342,18 @@ def test_probabilities_of_chosen_effects_come_true_as_often_as_they_say():
     assert len(p) > COUNT // 4
     spread = math.sqrt(float((p * (1.0 - p)).sum()))
     assert abs(sum(right) - p.sum()) < 3.0 * spread
+
+
+def test_what_a_choice_does_not_get_hardly_goes_to_nothing_where_the_gap_is_clear():
+    """An air drag of 38 sigma, of which three effects were made: nothing missing had 40 %."""
+    weights = {
+        "none": Weight(-1.2, 0.0, True),
+        "a+b+c": Weight(-13.0, 120.0, True),
+        "drag": Weight(-5.1, 80.0, True),
+        "slope": Weight(-5.1, 60.0, True),
+    }
+    known = calibration.shipped().probabilities(weights, Chosen("a+b+c", rivals=True))
+    assert known["none"] < 0.01 < known["drag"]
+    faint = {n: replace(w, evidence=0.1 * w.evidence) for n, w in weights.items()}
+    known = calibration.shipped().probabilities(faint, Chosen("a+b+c", rivals=True))
+    assert known["none"] > 0.1  # 12 may be what a chair is a little other in

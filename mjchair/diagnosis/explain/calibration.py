@@ -30,6 +30,9 @@ from mjchair.toml_file import read_toml
 
 NONE, OUTSIDE = "none", "outside"
 UNFITTED = 0.5 * rules.RIVAL_CHI2  # logarithm by which what was not fitted is behind at least
+# By which evidence against nothing is divided (assumption: what a chair is a little other in makes
+# evidence for effects too, of 4 at most in the studies of the other chair that hide nothing)
+NOTHING = 4.0
 LEAST = 1e-3  # a share of what a group of hypotheses has together that is listed
 LINES = ("effects", "rivalled", "remainder", "unchosen", NONE, OUTSIDE, "alone", "next")
 FILE = Path(__file__).with_name("calibration.toml")
@@ -120,9 +123,23 @@ class Calibration(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         about = chosen.name if chosen else max(logs, key=lambda n: logs[n])
         line: Line = getattr(self, kind(about, chosen))
         there = line.at(spoken(logs, weights, chosen, about))
-        out = self._with(logs, about, there) | self._without(logs, about, 1.0 - there)
+        others = self._against_nothing(logs, weights, about) if chosen else logs
+        out = self._with(logs, about, there) | self._without(others, about, 1.0 - there)
         total = sum(out.values())  # below 1 where nothing else is known
         return {n: p / total for n, p in out.items()}
+
+    def _against_nothing(
+        self, logs: Mapping[str, float], weights: Mapping[str, Weight], about: str
+    ) -> dict[str, float]:
+        """The same logarithms, but what speaks for the choice speaks more against nothing.
+
+        Forms tell how alike effects are, so evidence between them is divided by the temper. That
+        nothing is missing claims no form of an effect: it is held against the noise and the chair.
+        """
+        if NONE not in logs:
+            return dict(logs)
+        by = max(weights[about].evidence, 0.0) * (1.0 / NOTHING - 1.0 / self.temper)
+        return {**logs, NONE: logs[NONE] - max(by, 0.0)}
 
     def _with(self, logs: Mapping[str, float], about: str, whole: float) -> dict[str, float]:
         """Shares of `whole` for a hypothesis alone and for those that hold it and more."""
