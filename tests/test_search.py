@@ -39,7 +39,9 @@ from mjchair.errors import MjchairError
 
 
 def effect(name):
-    return SimpleNamespace(effect=SimpleNamespace(key=name, common=1.0), free=("size",))
+    return SimpleNamespace(
+        effect=SimpleNamespace(key=name, common=1.0), free=("size",), group=name, columns=(name,)
+    )
 
 
 ROLLING, MOTOR, WIND = effect("rolling"), effect("motor"), effect("wind")
@@ -305,6 +307,18 @@ def test_a_rival_takes_the_place_only_once_both_are_made_anew(rival, takes, fits
     monkeypatch.setattr(rivals, "rivals_of", lambda _, best: [others[best.hypothesis.keys[0]]])
     best, _ = rivals.against_rivals(looking, chosen)
     assert best.hypothesis is (motor if takes else ONE)
+
+
+@pytest.mark.parametrize(("total", "both_sides"), [(1099.5, True), (1100.5, True), (1102.0, False)])
+def test_both_sides_are_free_where_the_data_leave_open_which_it_is(total, both_sides, monkeypatch):
+    """Of two wheels that differ by 1 mm, a rival came in by the right one alone."""
+    right = Tried(Hypothesis((MOTOR,), 500.0, 490.0), SimpleNamespace(total=1100.0))
+    both = Hypothesis((SimpleNamespace(effect=MOTOR.effect, free=("left", "right")),), 500.0, 480.0)
+    looking = SimpleNamespace(fit=lambda h, best: Tried(h, SimpleNamespace(total=total)))
+    monkeypatch.setattr(selection, "freed", lambda _, hypothesis: both)
+    assert (selection._with_both_sides(looking, right).hypothesis is both) == both_sides
+    monkeypatch.setattr(selection, "freed", lambda _, hypothesis: hypothesis)
+    assert selection._with_both_sides(looking, right) is right
 
 
 def test_what_was_fitted_and_is_probable_stands_in_the_set():

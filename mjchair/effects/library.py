@@ -54,6 +54,7 @@ MECHANICAL = (
     mass_offset.EFFECT,
     payload.EFFECT,
     wheel_radius.EFFECT,
+    wheel_radius.TWISTING,
     cornering_stiffness.EFFECT,
     load_sensitivity.EFFECT,
     tire_friction.EFFECT,

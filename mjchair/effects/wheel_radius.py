@@ -1,8 +1,17 @@
-"""Rear wheels of another size: tire pressure, wear, another tire."""
+"""Rear wheels of another size: tire pressure, wear, another tire.
+
+Two forms, one name. A frame that is rigid stands on three wheels where one is larger, so that loads
+move from one diagonal to the other; a frame that twists stands on all four as before. How stiff a
+frame is in torsion nobody measures, so the diagnosis tries both.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import mujoco
+import numpy as np
 
 from mjchair.effects.effect import Effect, Parameter
 from mjchair.model import edits, parts
@@ -12,6 +21,35 @@ def edit(spec: mujoco.MjSpec, left: float, right: float) -> None:
     """Add `left` and `right` (m) to the radii of the rear wheels; their hubs stay in place."""
     for wheel, change in zip(parts.REAR, (left, right), strict=True):
         edits.add_radius(spec, wheel, change)
+
+
+def twisting(spec: mujoco.MjSpec, left: float, right: float) -> None:
+    """The same on a frame that twists: a hub rises by half of what its wheel is larger, so that all
+    four wheels stand on the floor as before, and the other one goes down as far.
+    """
+    edit(spec, left, right)
+    half = 0.5 * (left - right)
+    for wheel, rise in zip(parts.REAR, (half, -half), strict=True):
+        body = parts.named(spec.bodies, wheel, "body")
+        body.pos = np.asarray(body.pos, float) + np.array([0.0, 0.0, rise])
+
+
+def _sizes(values: Mapping[str, float], std: Mapping[str, float]) -> str:
+    """Both radii; of two that are free, the difference is what the data tell best."""
+    said = [
+        f"{side} {_mm(v)} ± {1e3 * std.get(side, 0.0):.2g} mm" for side, v in values.items() if v
+    ]
+    if len(said) > 1:
+        said.append(f"left less right {_mm(values['left'] - values['right'])} mm")
+    return ", ".join(said)
+
+
+def _sizes_on_a_frame_that_twists(values: Mapping[str, float], std: Mapping[str, float]) -> str:
+    return f"{_sizes(values, std)}, on a frame that twists, so that all wheels keep their loads"
+
+
+def _mm(radius: float) -> str:
+    return f"{1e3 * radius:+.2f}"
 
 
 EFFECT = Effect(
@@ -25,4 +63,6 @@ EFFECT = Effect(
     edit=edit,
     common=2.0,
     shared={"rolling_radius": ("left", "right")},
+    remark=_sizes,
 )
+TWISTING = replace(EFFECT, edit=twisting, remark=_sizes_on_a_frame_that_twists)

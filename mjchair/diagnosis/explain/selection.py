@@ -6,12 +6,14 @@ rules that decide stand in rules.py; a hypothesis that this chair cannot have is
 
 from __future__ import annotations
 
+from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain.backward_elimination import without_needless
-from mjchair.diagnosis.explain.choice import Choice
+from mjchair.diagnosis.explain.choice import Choice, Tried
 from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.forward_selection import grown
 from mjchair.diagnosis.explain.null_ensemble import confirmed
 from mjchair.diagnosis.explain.rivals import against_rivals, own_gains
+from mjchair.diagnosis.explain.shortlist import freed
 
 
 def choose(fits: Fits) -> Choice | None:
@@ -24,6 +26,7 @@ def choose(fits: Fits) -> Choice | None:
     if here is None:
         return None
     best, rivals = against_rivals(fits, without_needless(fits, here[0]))
+    best = _with_both_sides(fits, best)
     fits.say("the last fit, with everything made anew around it")
     fitted = fits.last_fit(best)
     return Choice(
@@ -35,3 +38,18 @@ def choose(fits: Fits) -> Choice | None:
         tried=fits.tried,
         dropped=fits.dropped,
     )
+
+
+def _with_both_sides(fits: Fits, best: Tried) -> Tried:
+    """The choice with both sides of an effect free, where the data leave open which side it is.
+
+    A rival may have come in by one side alone: of two wheels that differ by 1 mm nothing tells
+    whether one is larger or the other smaller than was said.
+    """
+    both = freed(fits, best.hypothesis)
+    if both.free == best.hypothesis.free:
+        return best
+    tried = fits.fit(both, best)
+    if tried is None or tried.fitted.total > best.fitted.total + rules.NOTHING:
+        return best
+    return tried

@@ -133,10 +133,14 @@ def _commonest(fits: Fits, options: Sequence[Hypothesis]) -> Hypothesis:
     """Of the hypotheses that fit alike, the one whose effects stand first in the library."""
     order = {s.effect.key: k for k, s in reversed(list(enumerate(fits.base.starts)))}
     alike = [h for h in options if rules.alike(h.score, options[0].score)]
-    best = min(alike, key=lambda h: sorted(order[k] for k in h.keys))
-    for start in best.starts:
-        best = _freed(fits, best, start)
-    return best
+    return freed(fits, min(alike, key=lambda h: sorted(order[k] for k in h.keys)))
+
+
+def freed(fits: Fits, hypothesis: Hypothesis) -> Hypothesis:
+    """The hypothesis with both sides of an effect free, where one or the other fit alike."""
+    for start in hypothesis.starts:
+        hypothesis = _freed(fits, hypothesis, start)
+    return hypothesis
 
 
 def _freed(fits: Fits, hypothesis: Hypothesis, start: Start) -> Hypothesis:
