@@ -357,3 +357,13 @@ def test_what_a_choice_does_not_get_hardly_goes_to_nothing_where_the_gap_is_clea
     faint = {n: replace(w, evidence=0.1 * w.evidence) for n, w in weights.items()}
     known = calibration.shipped().probabilities(faint, Chosen("a+b+c", rivals=True))
     assert known["none"] > 0.1  # 12 may be what a chair is a little other in
+
+
+def test_a_gap_that_nothing_explains_is_not_nothing():
+    """A scrub of 15 N m that no effect explained was `unknown`, with nothing missing at 96 %."""
+    known = {"none": 0.96, "outside": 0.01, "rolling_resistance": 0.03}
+    said = probability.with_gap(known, 1e-6)
+    assert next(iter(said)) == "outside"
+    assert said["none"] == 1e-6
+    assert sum(said.values()) == pytest.approx(1.0)
+    assert probability.with_gap({"outside": 1.0}, 1e-6) == {"outside": 1.0, "none": 0.0}

@@ -498,17 +498,17 @@ def _runs(c: Chair, seed: int, which: tuple[int, ...], seconds: float) -> list[d
     return [exact(c, *drive(c, MANOEUVRES[k], seconds, 1000 * seed + k)[:2]) for k in which]
 
 
-def _parts(run: dict[str, Array], noise: dict[str, float], afresh: bool = True) -> Array:
+def _parts(run: dict[str, Array], noise: dict[str, float], afresh: int | None = 1) -> Array:
     """All channels of a run over their noise, averaged in steps of 0.1 s.
 
     Args:
-      afresh: each 2 s is taken less a line, since a window may start from another state; else what
-        is counted from a start (angles, places) is taken less its mean, and all else as it is.
+      afresh: what each 2 s is taken less, since a window may start from another state: 1: a line;
+        0: its mean, of what is counted from a start (angles, places); None: nothing.
     """
     out = []
     width = int(FINE / 10)
     for name, std in noise.items():
-        order = 1 if afresh else (0 if name.endswith(COUNTED) else None)
+        order = afresh if afresh or name.endswith(COUNTED) else None
         x = run[name][: len(run[name]) // width * width].reshape(-1, width).mean(axis=1)
         for first in range(0, x.size, 20):
             part = x[first : first + 20]
@@ -541,7 +541,7 @@ class Answers:
 
 
 @cache
-def answers(manoeuvre: int, seconds: float, afresh: bool = True) -> Answers:
+def answers(manoeuvre: int, seconds: float, afresh: int | None = 1) -> Answers:
     """Simulated once for each manoeuvre, one triangle of force and one ripple after the other."""
     man, noise = MANOEUVRES[manoeuvre], Senses({}, 0.0, {}).noise
     p = np.array([*CHAIR.values(), *(0.0 for _ in HIDDEN)])
@@ -570,7 +570,7 @@ def answers(manoeuvre: int, seconds: float, afresh: bool = True) -> Answers:
     return Answers(*moved, np.array(floor).T)
 
 
-def _disturbances(c: Chair, which: tuple[int, ...], seconds: float, afresh: bool) -> Array:
+def _disturbances(c: Chair, which: tuple[int, ...], seconds: float, afresh: int | None) -> Array:
     """Columns (samples of all trials, k) of one standard deviation of what disturbs a chair.
 
     Pushes and twists are each trial's own; the floor is one.
@@ -593,11 +593,13 @@ def _moved(p: Array, numbers: Array) -> Array:
     return out
 
 
-def _sensed(right: Sequence[dict[str, Array]], noise: dict[str, float], faulty: bool) -> Array:
+def _sensed(
+    right: Sequence[dict[str, Array]], noise: dict[str, float], afresh: int | None
+) -> Array:
     """Columns of one standard deviation of errors of sensors: gains, biases, once a turn.
 
     Args:
-      faulty: for what sets one channel against another, which no start afresh every 2 s hides.
+      afresh: as of `_parts`.
     """
     angles = [n for n in noise if n.endswith("_angle")]
     errors: list[tuple[str, Callable[[Array], Array]]] = [
@@ -608,7 +610,7 @@ def _sensed(right: Sequence[dict[str, Array]], noise: dict[str, float], faulty: 
     out = []
     for name, of in errors:
         error = [{**r, name: of(r[name])} for r in right]
-        parts = [_parts(e, {name: noise[name]}, not faulty) for e in error]
+        parts = [_parts(e, {name: noise[name]}, afresh) for e in error]
         at = list(noise).index(name)
         whole = [np.zeros((len(noise), p.size)) for p in parts]
         for w, p in zip(whole, parts, strict=True):
@@ -625,15 +627,16 @@ def size(case: Case, seed: int, which: tuple[int, ...], seconds: float) -> None:
     """
     noise = Senses({}, 0.0, {}).noise
     sensor = any(name.startswith("sensor") for name in case.hidden)
-    faulty = sensor or "wheel_radius" in case.hidden
+    # what sets one channel against another no start afresh hides, but of angles where they begin
+    afresh = None if sensor else 0 if "wheel_radius" in case.hidden else 1
     c = chair(np.random.default_rng([seed, 2]), {})
     right = _runs(c, seed, which, seconds)
-    free = np.hstack([_disturbances(c, which, seconds, not faulty), _sensed(right, noise, faulty)])
+    free = np.hstack([_disturbances(c, which, seconds, afresh), _sensed(right, noise, afresh)])
     u, s, _ = np.linalg.svd(free, full_matrices=False)
     shrink = u * (1.0 - 1.0 / np.sqrt(1.0 + s**2))  # (I + F F')^-1/2 is I - shrink u'
 
     def seen(runs: Sequence[dict[str, Array]]) -> Array:
-        parts = np.concatenate([_parts(r, noise, not faulty) for r in runs])
+        parts = np.concatenate([_parts(r, noise, afresh) for r in runs])
         return parts - shrink @ (u.T @ parts)
 
     def without(numbers: Array) -> Array:

@@ -27,7 +27,7 @@ from mjchair.diagnosis.explain.left_out import (
     on_held_out,
     slow_part,
 )
-from mjchair.diagnosis.explain.probability import of_any, of_effects, probabilities
+from mjchair.diagnosis.explain.probability import of_any, of_effects, probabilities, with_gap
 from mjchair.diagnosis.explain.rivals import with_probable
 from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit import bounded
@@ -83,6 +83,8 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         nothing=max(probability, key=probability.__getitem__) == NONE,
     ):
         said = Verdict.NONE
+    if said == Verdict.UNKNOWN and choice is None:
+        probability = with_gap(probability, gap.p)
     named = choice if said in (Verdict.NAMED, Verdict.AMBIGUOUS) else None
     left = missing(choice.after if choice else gap)
     undecided = named if said == Verdict.AMBIGUOUS else None

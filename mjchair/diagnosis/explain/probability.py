@@ -72,6 +72,20 @@ def _name(h: Hypothesis) -> str:
     return "+".join(h.keys)
 
 
+def with_gap(probability: Mapping[str, float], p: float) -> dict[str, float]:
+    """Probabilities where a gap stands that no effect explains: chance alone has no more than `p`.
+
+    The rest of what nothing missing had goes to something outside the library.
+
+    Args:
+      probability: of hypotheses. p: of the gap, by chance alone.
+    """
+    chance = min(probability.get(NONE, 0.0), p)
+    outside = probability.get(OUTSIDE, 0.0) + probability.get(NONE, 0.0) - chance
+    out = {**probability, NONE: chance, OUTSIDE: outside}
+    return dict(sorted(out.items(), key=lambda item: -item[1]))
+
+
 def of_effects(probability: Mapping[str, float], keys: Sequence[str]) -> float:
     """Probability that these effects are there, alone or with others."""
     wanted = set(keys)
