@@ -268,6 +268,16 @@ def test_the_words_of_none_that_matters_fit_the_force():
     assert "N" not in nothing_missing(SimpleNamespace(gap=gap, material=large)).removeprefix("N")
 
 
+def test_nothing_is_missing_only_if_the_chair_is_where_the_fit_moved_it():
+    gap = SimpleNamespace(p_value=0.9)
+    plain, far = (
+        SimpleNamespace(gap=gap, material=None, next_experiment=n)
+        for n in ("", "Measure the mass.")
+    )
+    assert nothing_missing(plain).startswith("Nothing: ")
+    assert nothing_missing(far).startswith("Nothing, if the chair is as far ")
+
+
 def test_an_event_stands_beside_an_effect_that_brings_little_more():
     assert rules.happened_once(event=85.0, gain=100.0)
     assert not rules.happened_once(event=75.0, gain=100.0)

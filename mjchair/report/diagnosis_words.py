@@ -52,7 +52,9 @@ def nothing_missing(diagnosis: Diagnosis) -> str:
     """That nothing is missing, or nothing that matters, with the number."""
     gap, material = diagnosis.gap, diagnosis.material
     if gap is None or gap.p_value >= LEVEL or material is None:
-        return "Nothing: the chair explains these runs as well as the noise in them allows."
+        far = ", if the chair is as far from what the study says as these runs put it"
+        said = "the chair explains these runs as well as the noise in them allows."
+        return f"Nothing{far if diagnosis.next_experiment else ''}: {said}"
     if material.value >= material.limit:
         return (
             "Nothing that matters: single tests stand out that no effect explains, but all that is "
