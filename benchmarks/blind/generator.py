@@ -13,6 +13,7 @@ import base64
 import csv
 import json
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -587,24 +588,44 @@ def _size(case: Case, seed: int, trials: tuple[int, ...], seconds: float) -> Non
         # a new initial position or speed of one channel alone is not a possible motion
         moves = not name.startswith("sensor")
         known = np.vstack([roughly(k, seconds, moves) for k in trials])
-        first, size = dict(case.hidden[name]), 1.0
-        low, high = 0.0, np.inf
-        for _ in range(6):
-            case.hidden[name] = scaled(first, name, size)
+
+        def reached(name: str = name, moves: bool = moves, known: np.ndarray = known) -> float:
             if name.startswith("sensor"):
                 only = Case("one", {name: case.hidden[name]}, 0.0, case.channel)
                 exact = [_fault(only, e) for e in without]
             else:
                 world = World(np.random.default_rng([seed, 2]), {name: case.hidden[name]})
                 exact = [run(world, man, seconds)[0] for man in chosen]
-            case.reached[name] = detectability(apart(exact, without, moves), known)
-            factor = case.sigma / max(case.reached[name], 1e-6)
-            if 0.8 < factor < 1.25 or scaled(first, name, 1.2 * size) == case.hidden[name]:
-                break  # or the largest size is reached
-            low, high = (max(low, size), high) if factor > 1.0 else (low, min(high, size))
-            size *= float(np.clip(factor, 0.02, 6.0))
-            if not low < size < high:
-                size = float(np.sqrt(max(low, 0.01 * high) * high))
+            return detectability(apart(exact, without, moves), known)
+
+        fit_size(case, name, reached)
+
+
+def fit_size(
+    case: Case,
+    name: str,
+    reached: Callable[[], float],
+    tries: int = 6,
+    factors: tuple[float, float] = (0.02, 6.0),
+) -> None:
+    """Scale one hidden effect until it reaches about case.sigma, or the largest size there is.
+
+    Args:
+      reached: sigmas of the effect as it stands in the case. tries: sizes at most.
+      factors: the least and the most that one step may change the size by.
+    """
+    first, size = dict(case.hidden[name]), 1.0
+    low, high = 0.0, np.inf
+    for _ in range(tries):
+        case.hidden[name] = scaled(first, name, size)
+        case.reached[name] = reached()
+        factor = case.sigma / max(case.reached[name], 1e-6)
+        if 0.8 < factor < 1.25 or scaled(first, name, 1.2 * size) == case.hidden[name]:
+            break
+        low, high = (max(low, size), high) if factor > 1.0 else (low, min(high, size))
+        size *= float(np.clip(factor, *factors))
+        if not low < size < high:
+            size = float(np.sqrt(max(low, 0.01 * high) * high))
 
 
 def _fault(case: Case, exact: dict) -> dict:

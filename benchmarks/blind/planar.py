@@ -15,8 +15,9 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 
+import generator
 import numpy as np
-from generator import MANOEUVRES, SEAL, Case, Manoeuvre, _write, scaled, seal
+from generator import MANOEUVRES, SEAL, Case, Manoeuvre, _write, fit_size, seal
 from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
@@ -84,10 +85,14 @@ GAINED = ("speed", "gyro", "accel")  # of sensors whose names hold one of these
 COUNTED = ("angle", "position.x", "position.y", "heading")  # channels that no start afresh ties
 ENCODER = 0.004  # rad, once a turn
 ROUGHLY = {  # of any chair, as documented: factors, and lengths in m
-    "mass": 0.05, "yaw_inertia": 0.10, "wheel_inertia": 0.05, "rear_stiffness": 0.07,
-    "caster_stiffness": 0.07, "com_x": 0.01, "com_y": 0.002, "com_z": 0.03, "radius": 0.0015,
+    ours: generator.ROUGHLY[theirs]
+    for ours, theirs in {
+        "mass": "mass", "yaw_inertia": "inertia", "wheel_inertia": "wheel_inertia",
+        "rear_stiffness": "rear", "caster_stiffness": "casters",
+        "com_x": "ipos.0", "com_y": "ipos.1", "com_z": "ipos.2", "radius": "radius",
+    }.items()
 }  # fmt: skip
-BIAS = {"imu_gyro.z": 0.003, "imu_accelerometer.x": 0.05}  # as documented, of calibrated sensors
+BIAS = {n: generator.ROUGHLY[f"bias.{n}"] for n in ("imu_gyro.z", "imu_accelerometer.x")}
 
 (
     MASS, IZ, COM_X, COM_Y, COM_Z, HALF, R_LEFT, R_RIGHT, I_WHEEL, CASTER_X, CASTER_Y, TRAIL,
@@ -642,28 +647,21 @@ def size(case: Case, seed: int, which: tuple[int, ...], seconds: float) -> None:
     def without(numbers: Array) -> Array:
         return seen(_runs(replace(c, p=_moved(c.p, numbers)), seed, which, seconds))
 
-    numbers = np.zeros(len(ROUGHLY))
     for name in case.hidden:
-        first, factor = dict(case.hidden[name]), 1.0
-        low, high = 0.0, np.inf
-        for _ in range(8):
-            case.hidden[name] = scaled(first, name, factor)
+        numbers = np.zeros(len(ROUGHLY))
+
+        def reached(name: str = name, numbers: Array = numbers) -> float:
             if sensor:
                 runs = [_faulty(case, r) for r in right]
             else:
                 other = chair(np.random.default_rng([seed, 2]), {name: case.hidden[name]})
                 runs = _runs(other, seed, which, seconds)
-            case.reached[name], found = _left(seen(runs), without, numbers)
-            by = case.sigma / max(case.reached[name], 1e-6)
-            if 0.8 < by < 1.25 or scaled(first, name, 1.2 * factor) == case.hidden[name]:
-                break  # or the largest size is reached
-            if by > 1.0:  # larger sizes are fitted from here
-                low, numbers = max(low, factor), found
-            else:
-                high = min(high, factor)
-            factor *= float(np.clip(by, 0.05, 3.0))
-            if not low < factor < high:
-                factor = float(np.sqrt(max(low, 0.01 * high) * high))
+            sigmas, found = _left(seen(runs), without, numbers)
+            if sigmas < case.sigma:
+                numbers[:] = found  # larger sizes are fitted from here
+            return sigmas
+
+        fit_size(case, name, reached, 8, (0.05, 3.0))
 
 
 def _left(seen: Array, without: Callable[[Array], Array], first: Array) -> tuple[float, Array]:

@@ -217,8 +217,7 @@ def _following(base: Base, said: Verdict, plan: Plan | None, left: list[MissingF
     if said == Verdict.UNKNOWN:
         return wording.searching([(force.goes_with, force.sigmas) for force in left])
     if said == Verdict.NONE:
-        moved = base.plain.variant.offsets
-        known = [(n, moved.get(n.name, 0.0)) for n in base.bench.nuisances]
+        known = base.plain.variant.known_roughly
         return wording.measuring([(n, by) for n, by in known if rules.is_far(by)])
     return ""
 
@@ -374,8 +373,9 @@ def _notes(
         for name in (bounded.at_walls(choice.fitted.variant.offsets) if choice else [])
     ]
     if choice is not None and said in (Verdict.NAMED, Verdict.AMBIGUOUS):
-        said_of = (_remark(choice.fitted, term) for term in choice.fitted.variant.terms)
-        notes += [line for line in said_of if line]
+        terms = choice.fitted.variant.terms
+        said_of = [(term.effect.name, _remark(choice.fitted, term)) for term in terms]
+        notes += [f"{name}: {line}" for name, line in said_of if line]
     if said != Verdict.UNKNOWN:
         return notes
     if choice is not None:

@@ -258,9 +258,7 @@ def _rolled(
 
 
 def _moved(base: Base, fitted: Fitted | None) -> tuple[Moved, ...]:
-    offsets = (base.plain if fitted is None else fitted).variant.offsets
+    variant = (base.plain if fitted is None else fitted).variant
     return tuple(
-        Moved(name=n.name, std=n.std, unit=n.unit, by=offsets[n.name])
-        for n in base.bench.nuisances
-        if n.name in offsets
+        Moved(name=n.name, std=n.std, unit=n.unit, by=by) for n, by in variant.known_roughly
     )

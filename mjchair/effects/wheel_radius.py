@@ -24,8 +24,9 @@ def edit(spec: mujoco.MjSpec, left: float, right: float) -> None:
 
 
 def twisting(spec: mujoco.MjSpec, left: float, right: float) -> None:
-    """The same on a frame that twists: a hub rises by half of what its wheel is larger, so that all
-    four wheels stand on the floor as before, and the other one goes down as far.
+    """The same on a frame that twists, so that all wheels stand on the floor as before.
+
+    The hub of the larger wheel rises by half of the difference, and the other one goes down as far.
     """
     edit(spec, left, right)
     half = 0.5 * (left - right)

@@ -32,7 +32,7 @@ NONE, OUTSIDE = "none", "outside"
 UNFITTED = 0.5 * rules.RIVAL_CHI2  # logarithm by which what was not fitted is behind at least
 # By which evidence against nothing is divided (assumption: what a chair is a little other in makes
 # evidence for effects too, of 4 at most in the studies of the other chair that hide nothing)
-NOTHING = 4.0
+AGAINST_NOTHING = 4.0
 LEAST = 1e-3  # a share of what a group of hypotheses has together that is listed
 LINES = ("effects", "rivalled", "remainder", "unchosen", NONE, OUTSIDE, "alone", "next")
 FILE = Path(__file__).with_name("calibration.toml")
@@ -138,7 +138,7 @@ class Calibration(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         """
         if NONE not in logs:
             return dict(logs)
-        by = max(weights[about].evidence, 0.0) * (1.0 / NOTHING - 1.0 / self.temper)
+        by = max(weights[about].evidence, 0.0) * (1.0 / AGAINST_NOTHING - 1.0 / self.temper)
         return {**logs, NONE: logs[NONE] - max(by, 0.0)}
 
     def _with(self, logs: Mapping[str, float], about: str, whole: float) -> dict[str, float]:

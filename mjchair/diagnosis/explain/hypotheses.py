@@ -43,6 +43,11 @@ class Hypothesis:
         return tuple(sorted(s.effect.key for s in self.starts))
 
     @property
+    def name(self) -> str:
+        """As probabilities name it: keys joined by "+"."""
+        return "+".join(self.keys)
+
+    @property
     def label(self) -> str:
         """Its effects, as a line for a reader names them."""
         return " and ".join(self.keys)

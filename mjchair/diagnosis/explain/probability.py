@@ -51,7 +51,7 @@ def chosen(choice: Choice | None) -> Chosen | None:
     if choice is None:
         return None
     return Chosen(
-        name=_name(choice.hypothesis),
+        name=choice.hypothesis.name,
         gap_left=choice.after.exists,
         rivals=any(choice.rivals),
         sigmas=least_certain(choice),
@@ -66,10 +66,6 @@ def least_certain(choice: Choice) -> float:
     aside counts as five, since the centre of mass is only known to 10 mm.
     """
     return math.sqrt(max(min(choice.own_gains), 0.0))
-
-
-def _name(h: Hypothesis) -> str:
-    return "+".join(h.keys)
 
 
 def with_gap(probability: Mapping[str, float], p: float) -> dict[str, float]:
@@ -111,7 +107,7 @@ def weights(base: Base, choice: Choice | None) -> dict[str, Weight]:
     kept, absent = _kept(base, choice), _absent(choice)
 
     def add(h: Hypothesis, prior: float) -> None:
-        name = _name(h)
+        name = h.name
         if name in absent:
             return
         share = math.prod(keys[k] / everything for k in h.keys) * math.factorial(len(h.keys))
@@ -137,9 +133,9 @@ def _kept(base: Base, choice: Choice | None) -> dict[str, float]:
         return {}
     fits: dict[str, float] = {}
     for tried in choice.tried:
-        name, gained = _name(tried.hypothesis), gain(base, tried.fitted)
+        name, gained = tried.hypothesis.name, gain(base, tried.fitted)
         fits[name] = max(fits.get(name, gained), gained)
-    fits[_name(choice.hypothesis)] = gain(base, choice.fitted)
+    fits[choice.hypothesis.name] = gain(base, choice.fitted)
     return fits
 
 
@@ -150,8 +146,8 @@ def _absent(choice: Choice | None) -> set[str]:
     """
     if choice is None:
         return set()
-    there = {_name(t.hypothesis) for t in choice.tried if is_there(t.fitted)}
-    return {_name(t.hypothesis) for t in choice.tried} - there - {_name(choice.hypothesis)}
+    there = {t.hypothesis.name for t in choice.tried if is_there(t.fitted)}
+    return {t.hypothesis.name for t in choice.tried} - there - {choice.hypothesis.name}
 
 
 def _overstated(base: Base) -> float:

@@ -153,7 +153,7 @@ def with_probable(choice: Choice, probability: Mapping[str, float]) -> Choice:
     likely = [
         t
         for t in choice.tried
-        if rules.is_shown(probability.get("+".join(t.hypothesis.keys), 0.0)) and is_there(t.fitted)
+        if rules.is_shown(probability.get(t.hypothesis.name, 0.0)) and is_there(t.fitted)
     ]
     out = []
     for start, rivals in zip(choice.hypothesis.starts, choice.rivals, strict=True):

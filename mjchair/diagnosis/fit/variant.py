@@ -49,6 +49,11 @@ class Variant:
     offsets: dict[str, float] = field(default_factory=dict)
     terms: tuple[Term, ...] = ()
 
+    @property
+    def known_roughly(self) -> list[tuple[Nuisance, float]]:
+        """What is only roughly known of the chair, and by how many deviations it is moved."""
+        return [(n, self.offsets[n.name]) for n in self.nuisances if n.name in self.offsets]
+
     def edit(self, spec: mujoco.MjSpec) -> None:
         """Make the variant of the study's chair."""
         self.edit_chair(spec)

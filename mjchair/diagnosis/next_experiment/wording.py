@@ -121,15 +121,14 @@ def measuring(moved: Sequence[tuple[Nuisance, float]]) -> str:
     """
     said = []
     for n, by in moved:
-        unit = "" if n.unit == "1" else f" {n.unit}"
-        size = f"{100.0 * by * n.std:+.0f} %" if n.unit == "1" else f"{by * n.std:+.2g}{unit}"
+        change = by * n.std
+        size = f"{100.0 * change:+.0f} %" if n.unit == "1" else f"{change:+.2g} {n.unit}"
         said.append(f"{MEASURED.get(n.name, plain(n.name))}: {size}, {abs(by):.1f} sigmas")
     if not said:
         return ""
     return (
-        f"Measure what these runs put far from what the study says: {'; '.join(said)}. Write what "
-        "you find into study.toml and diagnose again: if it is as the study says now, something "
-        "else is missing, and then it shows."
+        f"Measure what these runs put far from what the study says: {'; '.join(said)}. If it is as "
+        "the study says now, something else is missing."
     )
 
 
