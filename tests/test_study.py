@@ -436,6 +436,30 @@ drive = 0.5
 """
 
 
+def test_what_a_person_measured_makes_effects_rarer_that_say_it_is_wrong(tmp_path):
+    from mjchair.diagnosis.data.roughly_known import MISTAKEN
+    from mjchair.diagnosis.diagnose import study_effects
+
+    def common(head):
+        study = mjchair.read_study(write(tmp_path, wheels(), head=head))
+        return {effect.key: effect.common for effect in study_effects(study)}
+
+    usual = common("")
+    told = common(
+        "[nuisance]\ncentre_x = 0.002\nmass = 1e-6\nrolling_radius = 0.01\n"
+        '"scale:left_wheel_speed" = 0.005\n'
+    )
+    assert told.keys() == usual.keys()
+    share = {key: told[key] / usual[key] for key in usual if told[key] != usual[key]}
+    assert share == pytest.approx(
+        {
+            "mass_offset": 0.2,  # 2 mm of the usual 10
+            "payload": MISTAKEN,
+            "sensor_scale:left_wheel_speed": 0.5,  # half a percent of the usual one
+        }
+    )
+
+
 def test_what_a_person_knows_reaches_the_rules_of_the_diagnosis(tmp_path):
     from mjchair.diagnosis.diagnose import study_effects
     from mjchair.diagnosis.fit import noise_levels

@@ -6,10 +6,12 @@ In: a study or its folder. Out: a `Diagnosis`, and from it the corrected chair.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import mujoco
 
+from mjchair.diagnosis.data.roughly_known import mistaken
 from mjchair.diagnosis.data.study import Study
 from mjchair.diagnosis.data.study_file import read_study
 from mjchair.diagnosis.decide import conclude
@@ -37,7 +39,14 @@ def study_effects(study: Study, more: Sequence[Effect] = ()) -> list[Effect]:
         if not (effect.outdoors and study.indoors)
         and not (effect.commanded and study.torque_measured)
     ]
-    return [*possible, *more]
+    wrong = mistaken(study.channels, study.nuisance, study.driven_as_measured)
+    return [*(_rarer(effect, wrong) for effect in possible), *more]
+
+
+def _rarer(effect: Effect, wrong: Mapping[str, float]) -> Effect:
+    """The effect, less common where it says that something measured is wrong."""
+    share = min((wrong[name] for name in effect.doubts if name in wrong), default=1.0)
+    return replace(effect, common=effect.common * share)
 
 
 def diagnose(

@@ -145,6 +145,7 @@ class Effect:
         those of the parameters hold on any.
       shared: what is only roughly known of any chair, and the parameters that move the same where
         all of them move as far: of the sum, the data say nothing.
+      instead: what is only roughly known of any chair and would be wrong too, were it there.
       remark: what values and their standard errors say in one sentence, for a verdict that names
         the effect; None: their names and units say it.
     """
@@ -171,12 +172,23 @@ class Effect:
     most: Callable[[mujoco.MjSpec], Values] | None = None
     least: Callable[[mujoco.MjSpec], Values] | None = None
     shared: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    instead: tuple[str, ...] = ()
     remark: Callable[[Mapping[str, float], Mapping[str, float]], str] | None = None
 
     @property
     def key(self) -> str:
         """Name, with the channel where there is one."""
         return f"{self.name}:{self.channel}" if self.channel else self.name
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What is only roughly known of any chair and its sensors, that this effect says is wrong.
+
+        Whoever measured one of these doubts the effect.
+        """
+        error = self.sensor in (SensorError.BIAS, SensorError.SCALE)
+        own = (f"{self.sensor}:{self.channel}",) if error else ()
+        return (*self.shared, *self.instead, *own)
 
     @property
     def fitted(self) -> tuple[Parameter, ...]:

@@ -36,4 +36,5 @@ EFFECT = Effect(
     source="a bag or a lap tray is 2-15 kg",
     edit=edit,
     seeds=(Seed(({"mass": 8.0, "height": LOW}, {"mass": 8.0, "height": HIGH}), _combine),),
+    instead=("mass",),
 )

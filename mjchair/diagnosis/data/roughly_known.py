@@ -127,6 +127,7 @@ MECHANICAL = (
 # of torques that were measured: gains of uncalibrated sensors are within 10 %, assumed. Mass, gain
 # and the mass that moves on the chair grow alike without a trace: 10 % of gain are 10 % of each
 TORQUE = Nuisance("torque", 0.05, "1", _torque)
+MISTAKEN = 0.02  # of numbers that were measured are wrong all the same (assumption)
 
 
 def nuisances(
@@ -140,20 +141,47 @@ def nuisances(
     Raises:
       MjchairError: a name that is not a nuisance.
     """
-    every = [*MECHANICAL, TORQUE] if driven_as_measured else list(MECHANICAL)
-    for channel in channels:
-        kind = sensor(channel)
-        if kind.bias is not None:
-            every.append(Nuisance(f"bias:{channel}", kind.bias, kind.unit, None, channel))
-        gain = given.get(f"scale:{channel}", kind.gain)
-        if gain is not None:
-            name = f"scale:{channel}"
-            every.append(Nuisance(name, gain, "1", None, channel, SensorError.SCALE))
+    every = _usual(channels, given, driven_as_measured)
     vectors = {"imu_gyro", "imu_accelerometer"}
     known = {n.name for n in every} | {f"{what}:{v}" for what in ("bias", "scale") for v in vectors}
     for name in given:
         if name not in known:
             raise MjchairError(f"unknown nuisance {name!r}" + nearest(name, known))
-    return tuple(
-        replace(n, std=given.get(n.name, given.get(n.name.rsplit(".", 1)[0], n.std))) for n in every
-    )
+    return tuple(replace(n, std=_given(n, given)) for n in every)
+
+
+def mistaken(
+    channels: tuple[str, ...], given: Mapping[str, float], driven_as_measured: bool = False
+) -> dict[str, float]:
+    """How much rarer a nuisance lies far away where a person measured it: name -> share, to 1.
+
+    It is as many times rarer as it was measured better than is usual, and never rarer than MISTAKEN
+    since people misread and mistype. What was not measured is not in it.
+    """
+    shares = {
+        n.name: max(_given(n, given) / n.std, MISTAKEN)
+        for n in _usual(channels, given, driven_as_measured)
+    }
+    return {name: share for name, share in shares.items() if share < 1.0}
+
+
+def _given(nuisance: Nuisance, given: Mapping[str, float]) -> float:
+    """Its standard deviation in a study: by its name, its sensor's, or as is usual."""
+    of_sensor = nuisance.name.rsplit(".", 1)[0]
+    return given.get(nuisance.name, given.get(of_sensor, nuisance.std))
+
+
+def _usual(
+    channels: tuple[str, ...], given: Mapping[str, float], driven_as_measured: bool
+) -> list[Nuisance]:
+    """The nuisances with the deviations that are usual; a doubtful gain has the one given."""
+    every = [*MECHANICAL, TORQUE] if driven_as_measured else list(MECHANICAL)
+    for channel in channels:
+        kind = sensor(channel)
+        if kind.bias is not None:
+            every.append(Nuisance(f"bias:{channel}", kind.bias, kind.unit, None, channel))
+        name = f"scale:{channel}"
+        gain = given.get(name) if kind.gain is None else kind.gain
+        if gain is not None:
+            every.append(Nuisance(name, gain, "1", None, channel, SensorError.SCALE))
+    return every
