@@ -27,7 +27,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from calibration_studies import DRAWN, MADE, Kept
+from calibration_studies import MADE, Kept
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
@@ -546,7 +546,7 @@ def main() -> None:
     path = args.out / "draws.jsonl"
     lines = path.read_text().splitlines() if path.exists() else []
     have = [(r["study"], r["seed"], r["number"]) for r in map(json.loads, lines)]
-    for file in (args.out / f"{made.name}.pkl" for made in MADE[:DRAWN]):
+    for file in (args.out / f"{made.name}.pkl" for made in MADE if made.drawn):
         if args.only and file.stem not in args.only:
             continue
         with file.open("rb") as source:

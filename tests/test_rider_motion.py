@@ -105,6 +105,20 @@ def test_the_old_name_is_understood_with_a_note():
         assert find("rider_sway") is find("rider_motion")
 
 
+def test_a_wave_in_step_with_strokes_is_that_motion_without_further_harmonics(heavy):
+    def built(effect, values):
+        spec = heavy.copy()
+        effect.on(spec).apply(spec, values)
+        return spec.to_xml()
+
+    values = {"sine_1": 1.5, "cosine_1": -0.7}
+    whole = built(stroke_motion.EFFECT, values)
+    assert built(stroke_motion.WAVE, values) == whole
+    assert built(stroke_motion.EFFECT, values | {"sine_2": 0.3}) != whole
+    said = stroke_motion.WAVE.remark(values, {"sine_1": 0.1, "cosine_1": 0.1})
+    assert f"{np.hypot(1.5, 0.7):.2f} kg m" in said
+
+
 def test_a_motion_in_step_with_strokes_keeps_the_common_centre_of_mass(heavy):
     """The first moment that is asked for comes about, and the whole stays where it is."""
     spec = heavy.copy()
@@ -154,10 +168,10 @@ def test_what_a_trunk_can_do_bounds_the_product_and_never_a_mass(heavy):
         effect.apply(heavy.copy(), {"sine_1": 9.0})
 
 
-def test_a_measured_motion_stands_in_for_both_forms_that_were_not_measured(heavy):
+def test_a_measured_motion_stands_in_for_all_forms_that_were_not_measured(heavy):
     columns = stroke_motion.COLUMNS
     shown = [e for e in library((), columns, chair=heavy) if e.name == "rider_motion"]
-    assert [len(e.parameters) for e in shown] == [4, 6]
+    assert [len(e.parameters) for e in shown] == [4, 2, 6]
     measured = [e for e in library((), (*columns, "rider_motion")) if e.name == "rider_motion"]
     assert [e.measured for e in measured] == ["rider_motion"]
 

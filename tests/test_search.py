@@ -727,3 +727,46 @@ def test_a_fit_begins_from_afar_only_where_the_near_one_is_stuck(
     )
     assert starts.fit().total == (1200.0 if afar else total)
     assert begun == (["near", None] if afar else ["near"])
+
+
+@pytest.mark.parametrize(
+    ("first_leaves", "total", "leaves", "taken"),
+    [
+        (True, 1040.0, False, True),
+        (True, 1040.0, True, False),  # no better
+        (True, 1060.0, False, False),  # its parameters bring too little
+        (False, 900.0, False, False),  # the first is enough
+    ],
+)
+def test_another_form_of_an_effect_stands_in_where_the_first_leaves_a_gap(
+    first_leaves, total, leaves, taken
+):
+    wave, whole = (
+        SimpleNamespace(
+            effect=SimpleNamespace(key="motion", common=1.0),
+            free=tuple("abcdef"[:count]),
+            columns=tuple("abcdef"[:count]),
+        )
+        for count in (2, 6)
+    )
+    priced = {id(s): hypotheses.priced([s], gain=900.0) for s in (wave, whole, WIND)}
+    gaps = {1080.0: first_leaves, total: leaves}
+    asked = []
+
+    def believed(hypothesis, _best):
+        asked.append(hypothesis.starts)
+        return Tried(hypothesis, fit(total, "motion"))
+
+    fits = SimpleNamespace(
+        base=SimpleNamespace(starts=[WIND, wave, whole]),
+        weigh=lambda starts: priced[id(starts[0])],
+        is_physical=lambda _: True,
+        believed=believed,
+        anew=lambda tried: tried.fitted,
+        gap_after=lambda fitted: SimpleNamespace(exists=gaps[fitted.total]),
+    )
+    here = Tried(priced[id(wave)], fit(1080.0, "motion")), SimpleNamespace(exists=first_leaves)
+    best, gap = alternatives.or_other_form(fits, here)
+    assert best.hypothesis.starts == ((whole,) if taken else (wave,))
+    assert gap.exists == (first_leaves and not taken)
+    assert asked == ([(whole,)] if first_leaves else [])

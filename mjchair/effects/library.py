@@ -70,6 +70,7 @@ MECHANICAL = (
     dragging_brake.EFFECT,
     surface_patch.EFFECT,
     rider_motion.HARMONIC,
+    stroke_motion.WAVE,
     stroke_motion.EFFECT,
     rider_motion.MEASURED,
 )

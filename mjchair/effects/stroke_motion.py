@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -72,7 +73,7 @@ def first_moment(values: Mapping[str, float], std: Mapping[str, float]) -> tuple
     """Half of the range of the first moment in a stroke, and its standard error, kg m."""
     phase = np.linspace(0.0, 2.0 * math.pi, 361)
     course = waves(phase)
-    total = np.sum([values[w] * course[f"stroke_{w}"] for w in WAVES], axis=0)
+    total = np.sum([values.get(w, 0.0) * course[f"stroke_{w}"] for w in WAVES], axis=0)
     high, low = int(np.argmax(total)), int(np.argmin(total))
     slopes = {w: 0.5 * float(np.diff(course[f"stroke_{w}"][[low, high]])[0]) for w in WAVES}
     error = math.sqrt(sum((slopes[w] * std.get(w, 0.0)) ** 2 for w in WAVES))
@@ -110,14 +111,19 @@ PARAMETERS = tuple(
 )
 
 
-def _combined(coefficients: np.ndarray) -> Values:
-    return {
-        p.name: clip(p, p.change * float(c)) for p, c in zip(PARAMETERS, coefficients, strict=True)
-    }
+def _seed(parameters: tuple[Parameter, ...]) -> Seed:
+    """Where a fit of these harmonics begins: each alone, of a typical size."""
 
+    def combined(coefficients: np.ndarray) -> Values:
+        return {
+            p.name: clip(p, p.change * float(c))
+            for p, c in zip(parameters, coefficients, strict=True)
+        }
 
-def _alone(parameter: Parameter) -> Values:
-    return {p.name: p.change if p is parameter else 0.0 for p in PARAMETERS}
+    def alone(parameter: Parameter) -> Values:
+        return {p.name: p.change if p is parameter else 0.0 for p in parameters}
+
+    return Seed(tuple(map(alone, parameters)), combined)
 
 
 EFFECT = Effect(
@@ -126,7 +132,7 @@ EFFECT = Effect(
     signature="a body moves on the chair in step with the strokes",
     source="bounds: trunk and arms of de Leva (1996), bent by 20 deg to both sides (assumption)",
     edit=move,
-    seeds=(Seed(tuple(map(_alone, PARAMETERS)), _combined),),
+    seeds=(_seed(PARAMETERS),),
     measured=COLUMNS[0],
     beside=True,
     most=_most,
@@ -135,3 +141,5 @@ EFFECT = Effect(
     common=PUSHES,
     remark=remark,
 )
+# A few strokes need no more than a wave, which has a third of the parameters
+WAVE = replace(EFFECT, parameters=PARAMETERS[:2], seeds=(_seed(PARAMETERS[:2]),))

@@ -1,8 +1,8 @@
 """Single effects that linear algebra around the chair without effects does not see, or sees small.
 
 In: fits, and the single effect that is best so far, with the gap that it leaves. Out: the same, or
-a better one: with what is only roughly known nearly as given, by most windows alone, or of a whole
-size.
+a better one: with what is only roughly known nearly as given, by most windows alone, in another
+form, or of a whole size.
 """
 
 from __future__ import annotations
@@ -11,9 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import hypotheses, whole_sizes
 from mjchair.diagnosis.explain.choice import Tried
 from mjchair.diagnosis.explain.fits import Fits, believable, goes_far
+from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.explain.shortlist import WithGap, best_of, better
 from mjchair.diagnosis.fit import bounded
@@ -61,6 +63,41 @@ def _or_weighed_by(fits: Fits, reduced: Reduced, here: WithGap | None) -> WithGa
     if best is here:
         fits.base = before
     return best
+
+
+def or_other_form(fits: Fits, here: WithGap) -> WithGap:
+    """The single effect, or another form of it that leaves no gap where the first leaves one.
+
+    A wave in step with the strokes has few parameters and is enough for few strokes; many show
+    its harmonics as well. The other form must come near in chi2 with the penalty of its parameters.
+    """
+    best, left = here
+    if not left.exists:
+        return here
+    for hypothesis in _other_forms(fits, best):
+        other = fits.believed(hypothesis, best)
+        if other is not None and other.price < best.price + rules.RIVAL_CHI2:
+            after = fits.gap_after(fits.anew(other))
+            if not after.exists:
+                return other, after
+    return here
+
+
+def _other_forms(fits: Fits, best: Tried) -> list[Hypothesis]:
+    """A hypothesis of each other form of a single effect that may be as good, best first."""
+    own = best.hypothesis.starts[0].effect
+    forms: dict[int, list[Hypothesis]] = {}
+    for start in fits.base.starts:
+        if start.effect.key == own.key and start.effect is not own:
+            forms.setdefault(id(start.effect), []).append(fits.weigh([start]))
+    firsts = [max(weighed, key=lambda h: h.score) for weighed in forms.values()]
+    near = [
+        h
+        for h in firsts
+        if fits.is_physical(h)
+        and rules.worth_trying(score=h.score, best=best.hypothesis.score, gain=best.hypothesis.gain)
+    ]
+    return sorted(near, key=lambda h: -h.score)
 
 
 def or_whole(fits: Fits, here: WithGap) -> WithGap:

@@ -45,7 +45,8 @@ def grown(fits: Fits) -> WithGap | None:
             break  # where no second effect stands beside the first, no third does
         here = _settled(fits, more)
         if size == 1:
-            here = alternatives.or_whole(fits, _or_left_over(fits, here))
+            here = alternatives.or_other_form(fits, _or_left_over(fits, here))
+            here = alternatives.or_whole(fits, here)
     return here
 
 
