@@ -1,8 +1,9 @@
 """The calibration of a diagnosis' probabilities: fitted to drawn studies, checked on others.
 
 What it does: takes the lines of `calibration_draws.py`, finds the temper under which what was
-hidden is most probable, and by isotonic regression (scikit-learn) how often a chosen hypothesis was
-right at the odds that the tempered evidence gives, or at its standard errors. Prints reliability on
+hidden is most probable, the factors of the clues (logistic regression), and by isotonic regression
+(scikit-learn) how often a chosen hypothesis was right at the odds that the tempered evidence gives,
+or at its sum of clues. Prints reliability on
 base studies that the fit did not see, each fifth of them in turn, of the calibration that ships on
 all of them, and of the real studies of `calibration_studies.py`, where these are there. In: the
 folder of draws.jsonl. Out: with --write, mjchair/diagnosis/explain/calibration.toml.
@@ -22,15 +23,17 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import tomli_w
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize, minimize_scalar
 from scipy.special import expit, logsumexp
 from scipy.stats import beta
 from sklearn.isotonic import IsotonicRegression
 
 from mjchair.diagnosis.explain.calibration import (
+    CLUES,
     FILE,
     LINES,
     NONE,
@@ -39,6 +42,7 @@ from mjchair.diagnosis.explain.calibration import (
     Chosen,
     Line,
     Weight,
+    clues,
     holds,
     kind,
     log_odds,
@@ -62,6 +66,8 @@ FAR = 1000.0  # log-odds beyond which all are alike
 ONES = tuple(np.r_[-FAR, np.linspace(-30.0, 30.0, 121), FAR])
 BANDS = (0.0, 0.5, 0.7, 0.9, 0.95, 0.99, 1.0)
 EVEN = Line(values=ONES, right=tuple(expit(ONES)))
+CLUED = ("effects", "remainder")  # lines that go by clues; choices with rivals go by odds as well
+PULL = 1.0  # precision by which factors of standardised clues are held near 0
 
 
 @dataclass(frozen=True)
@@ -84,7 +90,7 @@ def _drawn(line: dict[str, Any]) -> Drawn:
     if line["chosen"]:
         rivals = line["rivals"]  # a count, or the names for each effect
         there = any(rivals) if isinstance(rivals, list) else rivals > 0
-        chosen = Chosen(line["chosen"], line["gap_left"], there, line["sigmas"])
+        chosen = Chosen(line["chosen"], line["gap_left"], there)
     return Drawn(
         study=line["study"],
         truth=line["truth"] if "truth" in line else _truth(line["answer"]),
@@ -120,15 +126,17 @@ def fit(studies: Sequence[Drawn], made: str = "") -> Calibration:
         return -float(np.mean([_log_of_truth(raw, s) for s in studies]))
 
     temper = float(minimize_scalar(miss, bounds=(1.0, HOTTEST), options={"xatol": 0.02}).x)
-    raw = uncalibrated(temper)
+    raw = _with_factors(uncalibrated(temper), studies)
     kinds: dict[str, list[tuple[float, bool]]] = {name: [] for name in LINES}
     for study in studies:
         logs = raw.tempered(study.weights, study.chosen)
         name = about(study, logs)
-        value = float(np.clip(spoken(logs, study.weights, study.chosen, name), -FAR, FAR))
+        of = kind(name, study.chosen)
+        line = getattr(raw, of)
+        value = float(np.clip(spoken(line, logs, study.weights, study.chosen, name), -FAR, FAR))
         there = holds(study.truth, name)
         if name != OUTSIDE:
-            kinds[kind(name, study.chosen)].append((value, there))
+            kinds[of].append((value, there))
         if not there or name == OUTSIDE:
             others = {n: v for n, v in logs.items() if n == OUTSIDE or not holds(n, name)}
             odds = float(np.clip(log_odds(others, OUTSIDE), -FAR, FAR))
@@ -141,9 +149,49 @@ def fit(studies: Sequence[Drawn], made: str = "") -> Calibration:
         more = [v for n, v in logs.items() if n != name and holds(n, name)]
         if there and more:
             only = logs[name] - float(logsumexp(more))
-            kinds["alone"].append((only, study.truth == name))
-    lines = {name: _line(pairs) for name, pairs in kinds.items()}
+            gap = study.chosen is not None and study.chosen.gap_left
+            kinds["rest" if gap else "alone"].append((only, study.truth == name))
+    lines = {
+        name: msgspec.structs.replace(_line(pairs), by=getattr(raw, name).by)
+        for name, pairs in kinds.items()
+    }
     return Calibration(made, COMMAND, len(studies), round(temper, 3), **lines)
+
+
+def _with_factors(raw: Calibration, studies: Sequence[Drawn]) -> Calibration:
+    """The same with factors of the clues, on the lines that go by them."""
+    found = {}
+    for name in CLUED:
+        told = [
+            (list(clues(s.weights, s.chosen.name).values()), holds(s.truth, s.chosen.name))
+            for s in studies
+            if s.chosen and kind(s.chosen.name, s.chosen) == name
+        ]
+        factors = _factors(*(np.array(part, float) for part in zip(*told, strict=True)))
+        kept = {
+            clue: round(float(f), 3) for clue, f in zip(CLUES, factors, strict=True) if f > 5e-4
+        }
+        found[name] = msgspec.structs.replace(getattr(raw, name), by=kept)
+    return msgspec.structs.replace(raw, **found)
+
+
+def _factors(told: Array, right: Array) -> Array:
+    """Factors (clues,) of clues (studies, clues) by logistic regression; none is below zero.
+
+    So more evidence never makes a choice less probable. scikit-learn's has no such bounds.
+    """
+    spread = told.std(axis=0) + 1e-9
+    unit = (told - told.mean(axis=0)) / spread
+
+    def miss(b: Array) -> tuple[float, Array]:
+        odds = unit @ b[1:] + b[0]
+        off = expit(odds) - right
+        value = np.logaddexp(0.0, odds).sum() - right @ odds + 0.5 * PULL * b[1:] @ b[1:]
+        return float(value), np.r_[off.sum(), unit.T @ off + PULL * b[1:]]
+
+    bounds = [(None, None)] + [(0.0, None)] * unit.shape[1]
+    found = minimize(miss, np.zeros(1 + unit.shape[1]), jac=True, bounds=bounds, method="L-BFGS-B")
+    return np.asarray(found.x[1:] / spread)
 
 
 def _log_of_truth(known: Calibration, study: Drawn) -> float:
@@ -274,14 +322,14 @@ def main() -> None:
 
 def write(known: Calibration) -> None:
     """Put it beside the code that reads it."""
-    import msgspec
-
     table = msgspec.to_builtins(known)
     text = tomli_w.dumps({n: v for n, v in table.items() if not isinstance(v, dict)})
     for name, line in table.items():
         if isinstance(line, dict):
-            rows = [f"{n} = {list(v)}" for n, v in line.items()]
+            rows = [f"{n} = {list(v)}" for n, v in line.items() if n != "by"]
             text += "\n".join([f"\n[{name}]", *(w for r in rows for w in _wrapped(r))]) + "\n"
+            if line["by"]:
+                text += "\n" + tomli_w.dumps({name: {"by": line["by"]}})
     FILE.write_text(text, encoding="utf-8")
 
 

@@ -44,7 +44,6 @@ from mjchair.diagnosis.explain.probability import (
     PRIOR_OUTSIDE,
     PRIOR_THREE,
     PRIOR_TWO,
-    least_certain,
     weights,
 )
 from mjchair.diagnosis.explain.screening import silent
@@ -528,7 +527,6 @@ def diagnosed(bed: Bed, y: Sequence[Array]) -> dict[str, Any]:
         line |= {
             "gap_left": choice.after.exists,
             "rivals": sum(len(group) for group in choice.rivals),
-            "sigmas": least_certain(choice),
         }
     return line
 

@@ -37,7 +37,7 @@ from mjchair.diagnosis.explain import missing_force
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import closure
 from mjchair.diagnosis.explain.fits import Fits
-from mjchair.diagnosis.explain.probability import OUTSIDE, least_certain, weights
+from mjchair.diagnosis.explain.probability import OUTSIDE, weights
 from mjchair.diagnosis.explain.screening import Base, gap_after, prepare, screen_columns, silent
 from mjchair.diagnosis.explain.selection import choose
 from mjchair.diagnosis.fit.column_ids import ColumnId
@@ -370,7 +370,6 @@ def one(made: Made, out: Path, known: bool = False) -> dict:
             "gap_left": choice.after.exists,
             "rivals": [[r.hypothesis.keys for r in group] for group in choice.rivals],
             "closure": closure(gap, base, choice.fitted, choice.after),
-            "sigmas": least_certain(choice),
         }
     return line
 

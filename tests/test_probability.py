@@ -98,13 +98,12 @@ def chosen(known, name, rivals=(), gap_left=False):
 
 
 def test_a_choice_is_as_sure_as_its_least_certain_effect():
-    made = base(2.0)
-    choice = chosen(made, "rolling_resistance")
-    choice.fitted.sigmas["rolling_resistance"] = 3.0  # a standard error as wide as a prior
-    sure = of_effects(probabilities(made, choice), ["rolling_resistance"])
-    choice.own_gains.append(9.0)
-    less = of_effects(probabilities(made, choice), ["rolling_resistance"])
-    assert sure > rules.PROBABLE > 0.9 > less
+    def both_there(second):
+        known = {"a": 100.0, "b": 4.0, "a+b": 100.0 + second, NONE: 0.0, OUTSIDE: 1.0}
+        told = {name: Weight(math.log(0.2), value, True) for name, value in known.items()}
+        return calibration.shipped().probabilities(told, Chosen("a+b"))["a+b"]
+
+    assert both_there(80.0) > both_there(3.0) + 0.005
 
 
 @pytest.mark.parametrize("size", [0.0, 0.3, 2.0])
@@ -198,10 +197,10 @@ def test_effects_that_look_alike_share_it_the_common_one_first():
 
 
 def test_a_force_that_no_effect_makes_is_outside_the_library():
-    # of drawn studies with so large a force and no effect, seven of ten were outside the library
+    # of drawn studies with such a force and no effect, half were outside the library
     known = probabilities(base(0.0, force=10.0), None)
     assert max(known, key=lambda name: known[name]) == OUTSIDE
-    assert known[OUTSIDE] > 0.65
+    assert known[OUTSIDE] > 0.45
 
 
 def test_pairs_that_hold_an_effect_count_for_it():
@@ -220,9 +219,7 @@ def weights(evidence):
 @pytest.mark.parametrize(("gap_left", "rivals"), [(False, False), (False, True), (True, False)])
 def test_more_evidence_never_makes_an_effect_less_probable(gap_left, rivals):
     known = [
-        calibration.shipped().probabilities(
-            weights(e), Chosen("a", gap_left, rivals, math.sqrt(2.0 * max(e, 0.0)))
-        )
+        calibration.shipped().probabilities(weights(e), Chosen("a", gap_left, rivals))
         for e in np.linspace(-20.0, 4000.0, 400)
     ]
     assert all(sum(k.values()) == pytest.approx(1.0) for k in known)
@@ -236,7 +233,10 @@ def test_an_effect_that_leaves_a_gap_is_less_sure():
     whole, rest = (
         shipped.probabilities(weights(80.0), Chosen("a", left)) for left in (False, True)
     )
-    assert of_effects(whole, ["a"]) > 0.95 > of_effects(rest, ["a"])
+    assert of_effects(whole, ["a"]) > 0.95
+    assert of_effects(whole, ["a"]) > of_effects(rest, ["a"])
+    only = [known["a"] / of_effects(known, ["a"]) for known in (whole, rest)]
+    assert only[0] > 0.9 > 0.7 > only[1]  # where a gap is left, something more is there
 
 
 @pytest.mark.parametrize(
@@ -247,6 +247,8 @@ def test_an_effect_that_leaves_a_gap_is_less_sure():
         ("right = [", "right = [2.0, ", "as many values as shares"),
         ("values = [", "values = [nan, ", "as many values as shares"),
         ("[effects]", "[effects", "not TOML"),
+        ("gained = ", "gaind = ", "must be one of gained, each_gained"),
+        ("gained = ", "gained = -", "at least 0"),
     ],
 )
 def test_a_damaged_file_is_one_line(tmp_path, old, new, said):
@@ -291,8 +293,10 @@ def made_up_bed():
         time = np.linspace(0.0, 2.0, 40)
         smooth = np.exp(-0.5 * ((time[:, None] - time[None, :]) / 0.3) ** 2)
         smooth = np.linalg.cholesky(smooth + 1e-8 * np.eye(time.size))
-        J = np.vstack([smooth @ rng.standard_normal((40, 2 + len(SHAPES))) for _ in range(2)])
+        J = np.vstack([smooth @ rng.standard_normal((40, 2 + len(SHAPES) + 3)) for _ in range(2)])
         J[:, 3] = 0.97 * J[:, 2] + 0.25 * J[:, 3]  # beside two nuisances
+        strange = np.vstack([smooth @ rng.standard_normal((40, 3)) for _ in range(2)])
+        J[:, -3:] = 0.8 * strange + 0.6 * J[:, -3:]  # forces with a driver, near the strange ones
         at = np.linspace(0.2, 1.8, 6)
         blocks.append(
             Block(
@@ -300,14 +304,16 @@ def made_up_bed():
                 Z=J @ rng.standard_normal((J.shape[1], 2)) * 0.1 + rng.standard_normal((80, 2)),
                 precision=np.full(2, 1e-4),
                 states=2,
-                strange=np.vstack([smooth @ rng.standard_normal((40, 3)) for _ in range(2)]),
+                strange=strange,
                 pulses={f: (at, rng.standard_normal((80, 6)) / 5.0) for f in FORCES},
                 channel=np.repeat([0, 1], 40),
                 frequency=np.tile(np.arange(40) / 4.0, 2),
                 run=k // 2,
             )
         )
+    drivers = (Quantity.SPEED, Quantity.YAW_RATE, Quantity.TORQUE)
     columns = [*(RoughlyKnown(n) for n in ("one", "two")), *(s.columns[0] for s in starts)]
+    columns += [ForceColumn(ForceGroup(Force.FORWARD, Driver(q)), 0) for q in drivers]
     return Bed(
         Kept(
             name="made up",
@@ -334,7 +340,7 @@ def test_probabilities_of_chosen_effects_come_true_as_often_as_they_say():
         if said["chosen"]:
             known = calibration.shipped().probabilities(
                 {n: Weight(*w) for n, w in said["weights"].items()},
-                Chosen(said["chosen"], said["gap_left"], said["rivals"] > 0, said["sigmas"]),
+                Chosen(said["chosen"], said["gap_left"], said["rivals"] > 0),
             )
             told.append(of_effects(known, said["chosen"].split("+")))
             right.append(calibration.holds(truth.name, said["chosen"]))

@@ -6,10 +6,10 @@ which was chosen. What comes out: a probability of each. Two steps. Differences 
 divided by a temper, since no form of an effect is quite that of a real chair. Then the odds that
 the chosen effects are there are replaced by how often they were there in the cheap studies at such
 odds, a line that never falls (isotonic regression), with one line for choices that leave a gap and
-one for those with rivals. Effects that leave no gap and have no rival are read off by the standard
-errors of the least certain of them (the root of the chi2 that it brings): there the rivals are
-ruled out, and how large an effect is told right from wrong as well as all odds together. What is
-left of the probability goes to the other hypotheses.
+one for those with rivals. Choices that have no rival, or leave a gap, are read off by a sum of
+clues instead (logistic regression, with no factor below zero): how much evidence there is, and how
+far what was tried, what was not, and a force of any form are behind. What is left of the
+probability goes to the other hypotheses.
 """
 
 from __future__ import annotations
@@ -34,7 +34,12 @@ UNFITTED = 0.5 * rules.RIVAL_CHI2  # logarithm by which what was not fitted is b
 # evidence for effects too, of 4 at most in the studies of the other chair that hide nothing)
 AGAINST_NOTHING = 4.0
 LEAST = 1e-3  # a share of what a group of hypotheses has together that is listed
-LINES = ("effects", "rivalled", "remainder", "unchosen", NONE, OUTSIDE, "alone", "next")
+LINES = ("effects", "rivalled", "remainder", "unchosen", NONE, OUTSIDE, "alone", "rest", "next")
+CLUES = (
+    "gained", "each_gained", "over_tried", "over_untried", "share_tried", "share_untried",
+    "share_outside", "few", "prior",
+)  # fmt: skip
+CLEAR = 2.0  # of the evidence: what is further ahead of a choice makes it no less sure
 FILE = Path(__file__).with_name("calibration.toml")
 
 
@@ -58,24 +63,24 @@ class Chosen:
 
     Attributes:
       name: of it. gap_left: whether it leaves a gap. rivals: whether something could stand in it.
-      sigmas: standard errors away from no effect, of the least certain one: the root of the chi2
-        that it brings beside the others.
     """
 
     name: str
     gap_left: bool = False
     rivals: bool = False
-    sigmas: float = math.inf
 
 
 class Line(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """How often a hypothesis was right (1) at what spoke for it.
 
-    That is log-odds (natural logarithm) as computed, or standard errors.
+    Attributes:
+      values: log-odds (natural logarithm) as computed; or, where `by` is not empty, sums of clues.
+      right: the share that was right. by: clue -> its factor.
     """
 
     values: tuple[float, ...]
     right: tuple[float, ...]
+    by: dict[str, float] = {}
 
     def at(self, value: float) -> float:
         """The share that was right, between and beyond the stored points as at the next."""
@@ -88,11 +93,11 @@ class Calibration(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     Attributes:
       made, command: date, and how it is made again. studies: cheap studies that it was fitted to.
       temper: by which differences of evidence are divided.
-      effects: line of chosen effects that leave no gap and have no rival, by the standard errors of
-        the least certain; all others go by odds. rivalled: of those with rivals.
-      remainder: of those that leave a gap. unchosen: of the most probable effects where the search
-        chose none.
-      none: of nothing. alone: that no other effect is there, where the chosen effects are.
+      effects: line of chosen effects that leave no gap and have no rival. rivalled: of those with
+        rivals. remainder: of those that leave a gap. unchosen: of the most probable effects where
+        the search chose none.
+      none: of nothing. alone: that no other effect is there, where the chosen effects are and leave
+        no gap. rest: the same where they leave one.
       outside: of a force outside the library, where they are not. next: of the most probable other
         hypothesis, where neither is there.
     """
@@ -108,6 +113,7 @@ class Calibration(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     none: Line
     outside: Line
     alone: Line
+    rest: Line
     next: Line
 
     def probabilities(
@@ -122,9 +128,10 @@ class Calibration(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         logs = self.tempered(weights, chosen)
         about = chosen.name if chosen else max(logs, key=lambda n: logs[n])
         line: Line = getattr(self, kind(about, chosen))
-        there = line.at(spoken(logs, weights, chosen, about))
+        there = line.at(spoken(line, logs, weights, chosen, about))
         others = self._against_nothing(logs, weights, about) if chosen else logs
-        out = self._with(logs, about, there) | self._without(others, about, 1.0 - there)
+        more = self.rest if chosen is not None and chosen.gap_left else self.alone
+        out = _with(more, logs, about, there) | self._without(others, about, 1.0 - there)
         total = sum(out.values())  # below 1 where nothing else is known
         return {n: p / total for n, p in out.items()}
 
@@ -140,13 +147,6 @@ class Calibration(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
             return dict(logs)
         by = max(weights[about].evidence, 0.0) * (1.0 / AGAINST_NOTHING - 1.0 / self.temper)
         return {**logs, NONE: logs[NONE] - max(by, 0.0)}
-
-    def _with(self, logs: Mapping[str, float], about: str, whole: float) -> dict[str, float]:
-        """Shares of `whole` for a hypothesis alone and for those that hold it and more."""
-        more = {n: v for n, v in logs.items() if n != about and holds(n, about)}
-        alone = self.alone.at(logs[about] - float(logsumexp(list(more.values())))) if more else 1.0
-        rest = {n: (1.0 - alone) * whole * p for n, p in _shares(more).items()}
-        return {about: alone * whole} | rest
 
     def _without(self, logs: Mapping[str, float], about: str, whole: float) -> dict[str, float]:
         """Shares of `whole` for hypotheses that do not hold it: outside, the next, all others."""
@@ -192,21 +192,67 @@ def kind(about: str, chosen: Chosen | None) -> str:
 
 
 def spoken(
+    line: Line,
     logs: Mapping[str, float],
     weights: Mapping[str, Weight],
     chosen: Chosen | None,
     about: str,
 ) -> float:
-    """What speaks for a hypothesis on its line: log-odds, or standard errors.
+    """What speaks for a hypothesis on its line: log-odds, or a sum of clues.
 
     A choice is held against those that were fitted: how many others a linear promise brings near
     says more of how many there are than of the choice.
     """
     if chosen is None:
         return log_odds(logs, about)
-    if kind(about, chosen) == "effects":
-        return chosen.sigmas
+    if line.by:
+        known = clues(weights, about)
+        return sum(factor * known[name] for name, factor in line.by.items())
     return log_odds({n: v for n, v in logs.items() if weights[n].fitted}, about)
+
+
+def clues(weights: Mapping[str, Weight], about: str) -> dict[str, float]:
+    """What tells a right choice from a wrong one; none falls as the evidence for it grows.
+
+    Those over others are logarithms of the evidence by which these are behind, with its sign; the
+    shares are of the evidence for the choice. `each_gained`: what its least certain effect brings.
+    """
+    mine = weights[about].evidence
+    others = {n: w for n, w in weights.items() if n != NONE and not holds(n, about)}
+    outside = others.pop(OUTSIDE).evidence if OUTSIDE in others else 0.0
+    tried = max((w.evidence for w in others.values() if w.fitted), default=0.0)
+    untried = max((w.evidence for w in others.values() if not w.fitted), default=0.0)
+
+    effects = set(about.split("+"))
+    fewer = max((w.evidence for n, w in others.items() if set(n.split("+")) < effects), default=0.0)
+
+    def share(evidence: float) -> float:
+        return 1.0 - min(max(evidence, 0.0) / max(mine, 1.0), 1.0 + CLEAR)
+
+    return {
+        "gained": _log(max(mine, 0.0)),
+        "each_gained": _log(mine - max(fewer, 0.0)),
+        "over_tried": _log(mine - tried),
+        "over_untried": _log(mine - untried),
+        "share_tried": share(tried),
+        "share_untried": share(untried),
+        "share_outside": share(outside),
+        "few": -float(about.count("+")),
+        "prior": weights[about].prior,
+    }
+
+
+def _log(value: float) -> float:
+    """Logarithm of 1 plus the size of a number, with its sign."""
+    return math.copysign(math.log1p(abs(value)), value)
+
+
+def _with(line: Line, logs: Mapping[str, float], about: str, whole: float) -> dict[str, float]:
+    """Shares of `whole` for a hypothesis alone and for those that hold it and more."""
+    more = {n: v for n, v in logs.items() if n != about and holds(n, about)}
+    alone = line.at(logs[about] - float(logsumexp(list(more.values())))) if more else 1.0
+    rest = {n: (1.0 - alone) * whole * p for n, p in _shares(more).items()}
+    return {about: alone * whole} | rest
 
 
 def holds(name: str, wanted: str) -> bool:
@@ -225,12 +271,6 @@ def log_odds(logs: Mapping[str, float], about: str) -> float:
     if not others:
         return math.inf
     return float(logsumexp(inside) - logsumexp(others))
-
-
-def log_odds_alone(logs: Mapping[str, float], about: str) -> float:
-    """The same of a hypothesis' effects being there alone, over being there with others."""
-    more = [v for n, v in logs.items() if n != about and holds(n, about)]
-    return logs[about] - float(logsumexp(more)) if more else math.inf
 
 
 def _shares(logs: Mapping[str, float]) -> dict[str, float]:
@@ -264,6 +304,12 @@ def read(path: Path) -> Calibration:
                 f"{path}: {name} must have as many values as shares, each list rising, shares "
                 f"between 0 and 1; {again}"
             )
+        for clue, factor in line.by.items():
+            if clue not in CLUES or not 0.0 <= factor < math.inf:
+                raise MjchairError(
+                    f"{path}: {name} has the clue {clue} = {factor:g}; it must be one of "
+                    f"{', '.join(CLUES)}, at least 0; {again}"
+                )
     return known
 
 

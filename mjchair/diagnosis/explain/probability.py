@@ -54,18 +54,7 @@ def chosen(choice: Choice | None) -> Chosen | None:
         name=choice.hypothesis.name,
         gap_left=choice.after.exists,
         rivals=any(choice.rivals),
-        sigmas=least_certain(choice),
     )
-
-
-def least_certain(choice: Choice) -> float:
-    """Standard errors from no effect, of the effect that is least certain.
-
-    It is the root of the chi2 that an effect brings beside the others. A size over its standard
-    error is no more than what is only roughly known lets it be: a mass of 44 sigma that is 53 mm
-    aside counts as five, since the centre of mass is only known to 10 mm.
-    """
-    return math.sqrt(max(min(choice.own_gains), 0.0))
 
 
 def with_gap(probability: Mapping[str, float], p: float) -> dict[str, float]:
