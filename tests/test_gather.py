@@ -1,5 +1,7 @@
 """Files of a laboratory with a known motion into a study."""
 
+from types import SimpleNamespace
+
 import lab_files as lab
 import numpy as np
 import pytest
@@ -410,3 +412,40 @@ def test_a_marker_file_whose_chair_stands_cannot_be_put_on_a_clock(run, tmp_path
     np.savetxt(tmp_path / "push1_rider.csv", rows, "%.6g", ",", header=header, comments="")
     with pytest.raises(MjchairError, match=r"cannot be aligned: correlation .*--offset FILE="):
         gather(tmp_path, Known(mass=92.0))
+
+
+def test_gravity_is_read_where_the_chair_stands_and_not_where_it_speeds_up():
+    from mjchair.measurement import imu
+
+    time = np.arange(0.0, 20.0, 0.01)
+    gains = np.where(time < 2.0, 0.0, np.where(time % 1.0 < 0.3, 1.5, -0.4))
+    tilt = np.radians(8.0)
+    signal = np.column_stack(
+        [
+            gains * np.cos(tilt) + imu.GRAVITY * np.sin(tilt),
+            np.zeros(time.size),
+            imu.GRAVITY * np.cos(tilt) - gains * np.sin(tilt),
+        ]
+    )
+
+    def leans(rest):
+        sits = imu.mounting(time, signal, (time, gains), rest)
+        return abs(np.mean((signal @ sits.axes.T)[:, 0] - gains))
+
+    assert leans(time < 2.0) < 1e-3
+    assert leans(None) > 0.1  # by what the chair loses most of the time
+
+
+def test_the_chair_rests_where_the_wheels_that_are_recorded_do():
+    from mjchair.measurement.gather.join import _at_rest
+
+    time = np.arange(0.0, 5.0, 0.1)
+
+    def wheel(first, rolls):
+        mine = time[time >= first]
+        speed = np.where(mine < rolls, 0.0, 3.0)
+        return SimpleNamespace(time=mine, speed=speed)
+
+    late = _at_rest(time, [wheel(0.0, 1.0), wheel(2.3, 2.3)])
+    assert late[:9].all() and not late[11:].any()
+    assert not _at_rest(time, []).any()

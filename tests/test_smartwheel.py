@@ -81,6 +81,16 @@ def test_standing_at_the_start_gives_an_offset(tmp_path):
         still_baseline(read_smartwheel(write(tmp_path / "b.csv", table)))
 
 
+def test_a_hand_that_pushes_before_the_wheel_rolls_is_no_offset(tmp_path):
+    """A run of 2 s from rest had 0.75 N m of its push in its offset."""
+    table = rows(480, 0.0, 0.3, ticks=0.0)
+    table[72:192, 23] += np.minimum(0.3 * np.arange(120), 14.0)  # from 0.3 s on
+    table[96:, 4] = 1.0  # the wheel rolls from 0.4 s on
+    table[:, 23] += 0.05 * np.random.default_rng(2).standard_normal(480)
+    run = read_smartwheel(write(tmp_path / "a.csv", table))
+    assert still_baseline(run).offset[5] == pytest.approx(0.3, abs=0.05)
+
+
 def test_speed_of_a_steady_wheel(tmp_path):
     run = read_smartwheel(write(tmp_path / "a.csv", rows(ticks=20.0)))
     np.testing.assert_allclose(run.speed, 20.0 * 240.0 * 2 * np.pi / 4096, rtol=1e-6)

@@ -80,6 +80,8 @@ def _passed(angle: Array) -> int:
 def still_baseline(run: PushRim) -> Baseline:
     """Offset from where the wheel stands at the start; no once-per-revolution term.
 
+    The hand is there before the wheel rolls: samples in which it shows are left out.
+
     Raises:
       MjchairError: the wheel does not stand for a tenth of a second at the start.
     """
@@ -88,8 +90,11 @@ def still_baseline(run: PushRim) -> Baseline:
         raise MjchairError(
             f"{run.source}: the wheel moves after {count / RATE:g} s; give a baseline recording"
         )
-    free = np.arange(run.time.size) < count
-    return _fit(run, free, f"the first {count / RATE:.2g} s, in which the wheel stands")
+    stands = np.arange(run.time.size) < count
+    free = stands & hands_off(run)
+    if free.sum() < 0.1 * RATE:
+        free = stands
+    return _fit(run, free, f"the first {free.sum() / RATE:.2g} s, in which the wheel stands")
 
 
 def _stands(run: PushRim) -> int:

@@ -58,7 +58,7 @@ def without_offset(
         sensor, for the note.
     """
     if rest.sum() < 3:
-        return gyroscope, []
+        return gyroscope, [f"{name}: it never stands, so the gyroscope's offset stays on"]
     offset = np.median(gyroscope[rest], axis=0)
     text = ", ".join(f"{value:+.4f}" for value in offset)
     lasts = rest.sum() * float(np.median(np.diff(time)))
@@ -95,9 +95,15 @@ def axle(gyroscope: Array) -> Array | None:
     return np.asarray(axis * np.sign(np.sum(gyroscope @ axis)))
 
 
-def upright(accelerometer: Array) -> Array:
-    """Three axes (3, 3) of the sensor: z up by gravity, x and y anywhere level."""
-    up = np.median(accelerometer, axis=0)
+def upright(accelerometer: Array, rest: NDArray[np.bool_] | None = None) -> Array:
+    """Three axes (3, 3) of the sensor: z up by gravity, x and y anywhere level.
+
+    Args:
+      accelerometer: (n, 3), m/s^2. rest: (n,), where it stands, which tells gravity best; None, or
+        nowhere: the median of all samples, which leans by what the chair gains or loses speed.
+    """
+    stands = rest is not None and rest.sum() >= 3
+    up = np.median(accelerometer[rest] if stands else accelerometer, axis=0)
     up = up / np.linalg.norm(up)
     first = np.eye(3)[int(np.argmin(np.abs(up)))]
     x = first - up * (up @ first)
@@ -105,14 +111,20 @@ def upright(accelerometer: Array) -> Array:
     return np.stack([x, np.cross(up, x), up])
 
 
-def mounting(time: Array, accelerometer: Array, wheels: tuple[Array, Array] | None) -> Mounting:
+def mounting(
+    time: Array,
+    accelerometer: Array,
+    wheels: tuple[Array, Array] | None,
+    rest: NDArray[np.bool_] | None = None,
+) -> Mounting:
     """How a sensor on the frame sits.
 
     Args:
       time: (n,), s. accelerometer: (n, 3), m/s^2. wheels: times (s) on the same clock and the
         wheels' acceleration there, any unit; None: forward is the level axis that varies most.
+      rest: (n,), where the chair stands; None: not known.
     """
-    axes = upright(accelerometer)
+    axes = upright(accelerometer, rest)
     level = (accelerometer @ axes.T)[:, :2]
     level = level - level.mean(axis=0)
     if wheels is not None:

@@ -276,12 +276,9 @@ def _frame(one: Instrument, ours: Sequence[Instrument]) -> tuple[Instrument, lis
     """A sensor on the frame in the chair's axes, without its gyroscope's offset."""
     assert one.gyroscope is not None and one.accelerometer is not None
     moving = [w for w in ours if w.speed is not None]
-    rest = np.full(one.time.size, bool(moving))
-    for wheel in moving:
-        assert wheel.speed is not None
-        rest &= np.abs(np.interp(one.time, wheel.time, wheel.speed)) < RESTS
+    rest = _at_rest(one.time, moving)
     gyroscope, notes = imu.without_offset(one.time, one.gyroscope, rest, one.name)
-    sits = imu.mounting(one.time, one.accelerometer, _gained(ours) if moving else None)
+    sits = imu.mounting(one.time, one.accelerometer, _gained(ours) if moving else None, rest)
     how = "as the wheels speed up" if sits.told else "the level axis that varies most, assumed"
     rows = [
         f"{a} ({', '.join(f'{v:+.2f}' for v in r)})" for a, r in zip("xyz", sits.axes, strict=True)
@@ -293,6 +290,17 @@ def _frame(one: Instrument, ours: Sequence[Instrument]) -> tuple[Instrument, lis
         channels[f"imu_gyro.{axis}"] = gyroscope @ sits.axes[i]
         channels[f"imu_accelerometer.{axis}"] = one.accelerometer @ sits.axes[i]
     return replace(one, channels=channels), notes
+
+
+def _at_rest(time: Array, wheels: Sequence[Instrument]) -> NDArray[np.bool_]:
+    """Where (n,) every wheel that is recorded at a time (s) rests, and at least one is recorded."""
+    rest, seen = np.ones(time.size, bool), np.zeros(time.size, bool)
+    for wheel in wheels:
+        assert wheel.speed is not None
+        speed = np.interp(time, wheel.time, wheel.speed, left=np.nan, right=np.nan)
+        seen |= np.isfinite(speed)
+        rest &= ~(np.abs(speed) >= RESTS)
+    return rest & seen
 
 
 def _check_sides(name: str, ours: Sequence[Instrument]) -> list[str]:
