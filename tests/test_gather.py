@@ -15,6 +15,7 @@ from mjchair.measurement.gather.coasts import coasts
 from mjchair.measurement.gather.gather import gather, table_text
 from mjchair.measurement.gather.join import GatheredTrial
 from mjchair.measurement.gather.known import Known
+from mjchair.measurement.gather.sources import find_sources
 from mjchair.simulation.table import read_table
 
 # the chair's axes in a sensor's: x, y, z as rows; it lies on its side and looks backwards
@@ -218,6 +219,91 @@ def test_mappings_of_known_instruments_come_along(name, tmp_path):
     np.testing.assert_allclose(read.time, time, atol=1e-4)
     np.testing.assert_allclose(read.gyroscope, turning, atol=1e-5)
     np.testing.assert_allclose(read.accelerometer, pull, atol=2e-5)
+
+
+def xsens(path, run, before=(), *, rate=100.0, clock=False):
+    """A text export of MT Manager, counted from 65500; SampleTimeFine: None, blank."""
+    own, _, gyroscope, level = lab.frame_sensor(run, rate=rate)
+    count = (np.arange(own.size) + 65500) % 65536
+    rows = np.column_stack([count, level, gyroscope])
+    header = XSENS if clock else XSENS.replace("SampleTimeFine,", "")
+    lines = [",".join(f"{value:.8g}" for value in row) for row in rows]
+    if clock:
+        lines = [line.replace(",", ",,", 1) for line in lines]
+    path.write_text("\n".join([*before, header, *lines]) + "\n")
+
+
+def test_a_blank_clock_is_replaced_by_the_packet_counter(run, tmp_path):
+    xsens(tmp_path / "a.csv", run, ["// Update Rate: 100.0Hz"], clock=True)
+    file = read_delimited(tmp_path / "a.csv")
+    form = matching(file, read_formats())
+    assert form.name == "xsens_mtw"
+    assert read_export(file, form).time[1000] == pytest.approx(10.0)
+
+
+def test_a_blank_clock_without_another_is_refused(run, tmp_path):
+    """A DOT's gyroscope is in deg/s: what reads a counter takes it in rad/s, and is no way out."""
+    xsens(tmp_path / "a.csv", run, ["DeviceTag:,D422CD00"], clock=True)
+    file = read_delimited(tmp_path / "a.csv")
+    with pytest.raises(MjchairError, match="no cell of its time column 'SampleTimeFine' is filled"):
+        read_export(file, matching(file, read_formats()))
+
+
+def test_a_rate_is_read_from_the_first_lines_and_an_assumed_one_is_said(run, tmp_path):
+    for before, rate, said in (
+        (["// Update Rate: 60.0Hz"], 60.0, "a.csv: 60.0 Hz, as its first lines say"),
+        ([], 100.0, "a.csv: it has no clock and tells no rate; 100 Hz is assumed, give yours with"),
+    ):
+        xsens(tmp_path / "a.csv", run, before, rate=rate)
+        file = read_delimited(tmp_path / "a.csv")
+        read = read_export(file, matching(file, read_formats()))
+        assert read.time[60] == pytest.approx(60.0 / rate)
+        assert read.notes[0].startswith(said)
+        assert read.assumed == (None if before else rate)
+
+
+def test_clocks_that_cannot_be_aligned_are_told_of_an_assumed_rate(run, tmp_path):
+    lab.smartwheel(tmp_path / "push_left.csv", run, "left")
+    xsens(tmp_path / "push_frame.csv", run, rate=60.0)
+    with pytest.raises(
+        MjchairError, match=r"cannot be aligned.*is read at 100 Hz, which is assumed"
+    ):
+        gather(tmp_path)
+    xsens(tmp_path / "push_frame.csv", run, ["// Update Rate: 60.0Hz"], rate=60.0)
+    assert len(gather(tmp_path).trials) == 1
+
+
+def trials_of(folder, names):
+    for name in names:
+        (folder / name).write_text(XSENS + "\n0,0,0,0,9.8,0,0,0\n1,100,0,0,9.8,0,0,0\n")
+    return {source.path.name: source.trial for source in find_sources(folder).sources}
+
+
+@pytest.mark.parametrize(
+    "tag", ["MT_0120034-001", "MT_012005D6-000_00B4C3A2", "D422CD00", "D422CD006044"]
+)
+def test_the_tag_of_a_sensor_is_no_part_of_the_trials_name(tag, tmp_path):
+    names = [f"push1_{tag}.csv", f"push2_{tag}.csv", "push1_left_wheel.csv"]
+    found = trials_of(tmp_path, names)
+    assert found == dict(zip(names, ["push1", "push2", "push1"], strict=True))
+
+
+def test_a_tag_that_alone_tells_recordings_apart_is_kept(tmp_path):
+    """Also a date of eight digits is no tag."""
+    names = ["MT_0120034-001.csv", "day_MT_0120034-001.csv", "day_MT_0120034-002.csv"]
+    found = trials_of(tmp_path, [*names, "a_20210302.csv", "a_20210303.csv"])
+    assert len(set(found.values())) == 5
+
+
+def test_a_pushed_run_of_a_frame_sensor_alone_is_no_coast(run, tmp_path):
+    own, _, gyroscope, level = lab.frame_sensor(run)
+    lab.ngimu(tmp_path / "day_frame.csv", own, gyroscope, level)
+    with pytest.raises(MjchairError, match=r"'day': day_frame.csv shows .* pushes, and no file"):
+        gather(tmp_path)
+    own, _, gyroscope, level = lab.frame_sensor(lab.motion(12.0, pushed=False))
+    lab.ngimu(tmp_path / "day_frame.csv", own, gyroscope, level)
+    (trial,) = gather(tmp_path).trials
+    assert trial.manoeuvre == "coast"
 
 
 def test_any_table_comes_in_by_a_mapping_of_ones_own(tmp_path, run):

@@ -20,6 +20,7 @@ GAINS = 0.06  # m/s^2, above which something drives; a bump gives less over a qu
 BRAKES = 1.0  # m/s^2, beyond which something brakes
 EVEN = 0.20  # m/s^2, within which a coast's deceleration stays about its middle
 CUTOFF = 2.0  # Hz, of the speed that is judged
+PUSH, PUSHED = 0.3, 0.1  # m/s^2 and s, which a push is at least; a coast's slowing is below it
 MARGIN = 0.15  # s, left out at both ends
 
 
@@ -41,6 +42,24 @@ def coasts(time: Array, speed: Array) -> list[tuple[float, float]]:
     for first, last in _runs(free):
         found += _even_parts(even, gained, first, last)
     return found
+
+
+def pushes(time: Array, pull: Array) -> int:
+    """How often a chair is pushed, by its acceleration along the way alone.
+
+    Args:
+      time: (n,), s. pull: (n,), m/s^2, forward or backward positive, with any offset.
+    """
+    even = np.arange(time[0], time[-1], max(float(np.median(np.diff(time))), 0.005))
+    rate = 1.0 / float(np.median(np.diff(even)))
+    sos = butter(2, min(CUTOFF, 0.4 * rate), fs=rate, output="sos")
+    smooth = sosfiltfilt(sos, np.interp(even, time, pull), padlen=min(100, even.size - 2))
+    smooth = smooth - np.median(smooth)
+    counts = []
+    for way in (1.0, -1.0):
+        parts = _runs(way * smooth > PUSH)
+        counts.append(sum(bool(even[b] - even[a] >= PUSHED) for a, b in parts))
+    return max(counts)
 
 
 def _runs(flag: NDArray[np.bool_]) -> list[tuple[int, int]]:

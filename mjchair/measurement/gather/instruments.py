@@ -48,7 +48,8 @@ class Instrument:
       trigger: time at which its trigger rises, s; None. free: (n,), without a hand; None.
       radius: of the wheel, m, from the file; None. ground: (n,) m/s, of the chair over the floor,
         by markers; None. facing: (n,) rad, of its forward axis in the laboratory, the same.
-        doubted: whether its signs are those of a wheel of the other side.
+        doubted: whether its signs are those of a wheel of the other side. assumed: rate, Hz, that
+        its clock has by assumption; None: it is known.
       notes: one line each.
     """
 
@@ -67,6 +68,7 @@ class Instrument:
     ground: Array | None = None
     facing: Array | None = None
     doubted: bool = False
+    assumed: float | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -289,7 +291,7 @@ def _imu(source: Source) -> Instrument:
         notes.append(Detail(sits))
         return Instrument(
             name, source, export.time, {f"{side}_wheel_speed": speed}, {}, speed, side,
-            trigger=export.trigger, notes=tuple(notes),
+            trigger=export.trigger, notes=tuple(notes), assumed=export.assumed,
         )  # fmt: skip
     accelerometer = export.accelerometer
     if accelerometer is not None:
@@ -297,7 +299,7 @@ def _imu(source: Source) -> Instrument:
         notes += [said] if said else []
     return Instrument(
         name, source, export.time, gyroscope=gyroscope, accelerometer=accelerometer,
-        trigger=export.trigger, notes=tuple(notes),
+        trigger=export.trigger, notes=tuple(notes), assumed=export.assumed,
     )  # fmt: skip
 
 
@@ -308,6 +310,7 @@ def _short(path: Path) -> str:
 
 def _table(source: Source) -> Instrument:
     """A table whose columns are a study's, by name or by a mapping."""
+    export = None
     if source.format is not None and source.file is not None:
         export = read_export(source.file, source.format)
         time, columns, trigger = export.time, dict(export.columns), export.trigger
@@ -316,7 +319,8 @@ def _table(source: Source) -> Instrument:
         if RIDER_COLUMNS & set(table.columns) and not _of_wheel(table):
             return _rider(source, table)
         time, columns, trigger = np.asarray(table.time), dict(table.columns), None
-    columns, notes = table_wheels.put_right(time, columns, source.path.name, source.format is None)
+    columns, notes = table_wheels.put_right(time, columns, source.path.name, export is None)
+    notes = [*export.notes, *notes] if export is not None else notes
     wheels: tuple[str, ...] = ("left_wheel", "right_wheel")
     torque = {name: columns.pop(name) for name in wheels if name in columns}
     courses = {one: table_wheels.motion(time, columns, one) for one in ("left", "right")}
