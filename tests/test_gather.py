@@ -389,6 +389,37 @@ def test_the_recording_that_ships_is_gathered_by_one_command(tmp_path, capsys):
     assert sorted(p.name for p in out.iterdir()) == files
 
 
+def test_a_study_that_cannot_be_read_is_named_by_its_own_folder(tmp_path, capsys, monkeypatch):
+    from mjchair.diagnosis.data import study_file
+
+    def refuse(folder):
+        raise MjchairError(f"{folder}/study.toml: not good")
+
+    monkeypatch.setattr(study_file, "read_study", refuse)
+    source, out = tmp_path / "mine", tmp_path / "study"
+    source.mkdir()
+    (source / "run.csv").write_bytes(samples.propulsion().read_bytes())
+    assert main(["gather", str(source), "--out", str(out), "--mass", "92"]) == 2
+    assert f"{out}/study.toml: not good" in capsys.readouterr().err
+
+
+def test_force_takes_the_tables_of_an_earlier_gather_away_and_no_other_file(tmp_path):
+    source, out = tmp_path / "mine", tmp_path / "study"
+    source.mkdir()
+    rolls = samples.propulsion().read_bytes()
+    (source / "first.csv").write_bytes(rolls)
+    command = ["gather", str(source), "--out", str(out), "--mass", "92", "--force"]
+    assert main(command) == 0
+    for name in ("mine.csv", "named.csv"):
+        (out / name).write_text("time,left_wheel\n0,1\n")
+    with (out / "study.toml").open("a") as study:
+        study.write('[[trial]]\nfile = "named.csv"\n')
+    (source / "first.csv").rename(source / "second.csv")
+    assert main(command) == 0
+    left = {path.name for path in out.glob("*.csv")}
+    assert left == {"mine.csv", "named.csv", "second.csv"}
+
+
 BAD = {
     "no folder": (["{empty}/none"], "no folder"),
     "nothing in it": (["{empty}"], "no file of a known kind"),
@@ -397,6 +428,12 @@ BAD = {
     "only a baseline": (["{rest}"], "a recording of an untouched rim, and none of the rim in use"),
     "heavy rider": (["{good}", "--rider-mass", "95", "--mass", "92"], "the rider weighs 95 kg"),
     "radius in mm": (["{good}", "--wheel-radius", "300"], "is it in mm?"),
+    "light together": (
+        ["{good}", "--mass", "18"],
+        "less the 15 kg of the model's chair",
+    ),
+    "light rider": (["{good}", "--mass", "18", "--chair-mass", "15"], "leaves 3 kg for the rider"),
+    "round brackets": (["{round}"], "a table has its units in [ ], as in 'time [ms]'"),
     "unknown floor": (["{good}", "--floor", "overgroud"], "did you mean 'overground'"),
     "no such file": (["{good}", "--offset", "imu.csv=3"], "--offset imu.csv: no such file"),
     "no offset": (["{good}", "--offset", "3"], "is not FILE=SECONDS"),
@@ -419,6 +456,7 @@ def bad_folders(tmp_path_factory):
         "good/run.csv": whole,
         "plan/run.csv": whole,
         "plan/gather.toml": '[files."run.csv"]\nsides = "left"\n',
+        "round/run.csv": "Time (ms),left_wheel_speed (rpm)\n0,0\n10,1\n20,2\n",
         "twice/a_left.csv": whole,
         "twice/left_a.csv": whole.replace("0.30", "0.31"),
     }

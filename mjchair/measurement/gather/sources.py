@@ -202,6 +202,9 @@ def _kind(
     if file.values.shape[1] in (24, 25):
         return "smartwheel", None, file, ""
     columns = ", ".join(file.header[:4]) or f"{file.values.shape[1]} columns without names"
+    if file.header and file.header[0].lower().split("(")[0].strip() == "time":
+        why = f"its first column is {file.header[0]!r}; a table has its units in [ ], as in "
+        return "", None, None, f"{why}'time [ms]', or write a mapping, see docs/your_data.md"
     return (
         "",
         None,
