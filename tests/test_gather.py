@@ -11,7 +11,7 @@ from mjchair.measurement import samples
 from mjchair.measurement.clocks import Signal, align, best_alignment
 from mjchair.measurement.delimited import read_delimited
 from mjchair.measurement.exports import matching, read_export, read_formats
-from mjchair.measurement.gather.coasts import coasts
+from mjchair.measurement.gather.coasts import coasts, pushes
 from mjchair.measurement.gather.gather import gather, table_text
 from mjchair.measurement.gather.join import GatheredTrial
 from mjchair.measurement.gather.known import Known
@@ -367,6 +367,13 @@ def test_a_coast_is_a_coast_and_strokes_are_none(run):
     assert 21.5 < only[0] < 23.5
     assert only[1] > 29.0
     assert coasts(*_column(lab.motion(20.0, coast=0.2))) == []
+
+
+def test_pushes_are_counted_either_way_and_a_few_samples_hold_none(run):
+    time, wheels, _ = run
+    pull = np.gradient(wheels.mean(axis=1) * lab.RADIUS, time)[::10]
+    assert pushes(time[::10], pull + 0.5) == pushes(time[::10], -pull) > 10
+    assert pushes(np.arange(3.0), np.array([0.0, 5.0, 0.0])) == 0
 
 
 def _column(run):

@@ -119,6 +119,18 @@ def test_a_chair_that_rolls_backwards_or_turns_on_the_spot_is_left_and_it_says_s
         assert line in said[0]
 
 
+def test_a_gyroscope_in_the_table_tells_a_spin_from_a_wheel_that_counts_down(run):
+    time, speed, _, _ = run
+    for seconds, sign in ((25.0, -1), (8.0, 1)):  # a long spin is left, a short way is turned
+        some = time < seconds
+        wheels = {"left_wheel_speed": -speed[some, 0], "right_wheel_speed": speed[some, 1]}
+        turning = (speed[some, 0] + speed[some, 1]) * lab.RADIUS / lab.TRACK
+        yaw = turning if sign < 0 else 0.01 * np.sin(time[some])
+        out, said = put_right(time[some], {**wheels, "imu_gyro.z": yaw}, "a.csv")
+        np.testing.assert_array_equal(out["left_wheel_speed"], sign * speed[some, 0])
+        assert bool(said) == (sign > 0)
+
+
 def test_signs_that_a_mapping_gives_are_believed(run):
     time, speed, _, torque = run
     columns = {"left_wheel_speed": speed[:, 0], "left_wheel": -torque[:, 0]}

@@ -29,6 +29,8 @@ PUSHES = 3.0  # N m, which a torque must range over to tell a sign
 ROLLS = 1.0  # rad, of which a wheel must turn on balance to tell which way is forward
 SPUN = 40.0  # rad of both wheels in opposite ways: 7 turns of the chair on the spot; assumption
 ALIKE = 0.2  # within which two wheels of a straight way turn by the same
+YAW = 0.5  # rad of the chair for a rad by which its wheels turn apart: 0.3 m over 0.56 m
+SEEN, UNSEEN = 0.5, 0.25  # of the turn that wheels tell, which a gyroscope sees, or does not
 RATE = 100.0  # Hz, at which torque and acceleration are compared at most
 SIDES = ("left", "right")
 
@@ -113,10 +115,11 @@ def _signs(
     """Each side with the signs of its motion and its torque; lines are added to the notes."""
     found = {side: _wheel(time, columns, side) for side in SIDES}
     wheels = {side: wheel for side, wheel in found.items() if wheel is not None}
+    spun = _spun(time, columns, wheels)
     out = []
     for side, wheel in wheels.items():
         other = wheels.get("left" if side == "right" else "right")
-        travel, moment, said = _turned(wheel, other)
+        travel, moment, said = _turned(wheel, other, spun)
         if said:
             notes.append(_line(name, side, said, turn, (travel, moment) != (1, 1)))
         out.append((side, travel, moment))
@@ -132,7 +135,17 @@ def _line(name: str, side: str, said: str, turn: bool, told: bool) -> str:
     return f"{name}: {side} wheel {said}; turned so that forward is positive"
 
 
-def _turned(wheel: _Wheel, other: _Wheel | None) -> tuple[int, int, str]:
+def _spun(time: Array, columns: Mapping[str, Array], wheels: Mapping[str, _Wheel]) -> bool | None:
+    """Whether a gyroscope in the table sees the turn that two wheels tell; None: it is open."""
+    yaw = columns.get("imu_gyro.z")
+    if yaw is None or len(wheels) < 2:
+        return None
+    told = YAW * (wheels["right"].net - wheels["left"].net)
+    share = float(np.trapezoid(_filled(time, yaw), time)) / told if abs(told) > ROLLS else 0.5
+    return True if share > SEEN else False if abs(share) < UNSEEN else None
+
+
+def _turned(wheel: _Wheel, other: _Wheel | None, spun: bool | None) -> tuple[int, int, str]:
     """Signs of a wheel's motion and torque, and what was seen; empty: they are right."""
     against = wheel.match < -TOLD
     if wheel.net >= -ROLLS:
@@ -141,9 +154,12 @@ def _turned(wheel: _Wheel, other: _Wheel | None) -> tuple[int, int, str]:
         return -1, 1, "counts down where its torque drives it"
     if other is None or other.net <= ROLLS:
         return 1, 1, "rolls backwards on balance; if it went forward, turn its signs in a mapping"
+    if spun:
+        return 1, 1, ""
     less, more = sorted((-wheel.net, other.net))
-    if less > SPUN and more - less < ALIKE * more:
-        return -1, -1 if wheel.match > TOLD else 1, "counts down as the other one counts up"
+    if spun is False or (less > SPUN and more - less < ALIKE * more):
+        said = "counts down as the other one counts up (a chair that spun: give signs by a mapping)"
+        return -1, -1 if wheel.match > TOLD else 1, said
     doubt = "it is left as it is; if it rolled straight, turn its signs in a mapping"
     return 1, 1, f"turns against the other one, as on the spot; {doubt}"
 
