@@ -13,10 +13,11 @@ from mjchair.measurement import samples
 from mjchair.measurement.clocks import Signal, align, best_alignment
 from mjchair.measurement.delimited import read_delimited
 from mjchair.measurement.exports import matching, read_export, read_formats
-from mjchair.measurement.gather.coasts import coasts
+from mjchair.measurement.gather.coasts import coasts, pushes
 from mjchair.measurement.gather.gather import gather, table_text
 from mjchair.measurement.gather.join import GatheredTrial
 from mjchair.measurement.gather.known import Known
+from mjchair.measurement.gather.sources import find_sources
 from mjchair.simulation.table import read_table
 
 # the chair's axes in a sensor's: x, y, z as rows; it lies on its side and looks backwards
@@ -222,6 +223,91 @@ def test_mappings_of_known_instruments_come_along(name, tmp_path):
     np.testing.assert_allclose(read.accelerometer, pull, atol=2e-5)
 
 
+def xsens(path, run, before=(), *, rate=100.0, clock=False):
+    """A text export of MT Manager, counted from 65500; SampleTimeFine: None, blank."""
+    own, _, gyroscope, level = lab.frame_sensor(run, rate=rate)
+    count = (np.arange(own.size) + 65500) % 65536
+    rows = np.column_stack([count, level, gyroscope])
+    header = XSENS if clock else XSENS.replace("SampleTimeFine,", "")
+    lines = [",".join(f"{value:.8g}" for value in row) for row in rows]
+    if clock:
+        lines = [line.replace(",", ",,", 1) for line in lines]
+    path.write_text("\n".join([*before, header, *lines]) + "\n")
+
+
+def test_a_blank_clock_is_replaced_by_the_packet_counter(run, tmp_path):
+    xsens(tmp_path / "a.csv", run, ["// Update Rate: 100.0Hz"], clock=True)
+    file = read_delimited(tmp_path / "a.csv")
+    form = matching(file, read_formats())
+    assert form.name == "xsens_mtw"
+    assert read_export(file, form).time[1000] == pytest.approx(10.0)
+
+
+def test_a_blank_clock_without_another_is_refused(run, tmp_path):
+    """A DOT's gyroscope is in deg/s: what reads a counter takes it in rad/s, and is no way out."""
+    xsens(tmp_path / "a.csv", run, ["DeviceTag:,D422CD00"], clock=True)
+    file = read_delimited(tmp_path / "a.csv")
+    with pytest.raises(MjchairError, match="no cell of its time column 'SampleTimeFine' is filled"):
+        read_export(file, matching(file, read_formats()))
+
+
+def test_a_rate_is_read_from_the_first_lines_and_an_assumed_one_is_said(run, tmp_path):
+    for before, rate, said in (
+        (["// Update Rate: 60.0Hz"], 60.0, "a.csv: 60.0 Hz, as its first lines say"),
+        ([], 100.0, "a.csv: it has no clock and tells no rate; 100 Hz is assumed, give yours with"),
+    ):
+        xsens(tmp_path / "a.csv", run, before, rate=rate)
+        file = read_delimited(tmp_path / "a.csv")
+        read = read_export(file, matching(file, read_formats()))
+        assert read.time[60] == pytest.approx(60.0 / rate)
+        assert read.notes[0].startswith(said)
+        assert read.assumed == (None if before else rate)
+
+
+def test_clocks_that_cannot_be_aligned_are_told_of_an_assumed_rate(run, tmp_path):
+    lab.smartwheel(tmp_path / "push_left.csv", run, "left")
+    xsens(tmp_path / "push_frame.csv", run, rate=60.0)
+    with pytest.raises(
+        MjchairError, match=r"cannot be aligned.*is read at 100 Hz, which is assumed"
+    ):
+        gather(tmp_path)
+    xsens(tmp_path / "push_frame.csv", run, ["// Update Rate: 60.0Hz"], rate=60.0)
+    assert len(gather(tmp_path).trials) == 1
+
+
+def trials_of(folder, names):
+    for name in names:
+        (folder / name).write_text(XSENS + "\n0,0,0,0,9.8,0,0,0\n1,100,0,0,9.8,0,0,0\n")
+    return {source.path.name: source.trial for source in find_sources(folder).sources}
+
+
+@pytest.mark.parametrize(
+    "tag", ["MT_0120034-001", "MT_012005D6-000_00B4C3A2", "D422CD00", "D422CD006044"]
+)
+def test_the_tag_of_a_sensor_is_no_part_of_the_trials_name(tag, tmp_path):
+    names = [f"push1_{tag}.csv", f"push2_{tag}.csv", "push1_left_wheel.csv"]
+    found = trials_of(tmp_path, names)
+    assert found == dict(zip(names, ["push1", "push2", "push1"], strict=True))
+
+
+def test_a_tag_that_alone_tells_recordings_apart_is_kept(tmp_path):
+    """Also a date of eight digits is no tag."""
+    names = ["MT_0120034-001.csv", "day_MT_0120034-001.csv", "day_MT_0120034-002.csv"]
+    found = trials_of(tmp_path, [*names, "a_20210302.csv", "a_20210303.csv"])
+    assert len(set(found.values())) == 5
+
+
+def test_a_pushed_run_of_a_frame_sensor_alone_is_no_coast(run, tmp_path):
+    own, _, gyroscope, level = lab.frame_sensor(run)
+    lab.ngimu(tmp_path / "day_frame.csv", own, gyroscope, level)
+    with pytest.raises(MjchairError, match=r"'day': day_frame.csv shows .* pushes, and no file"):
+        gather(tmp_path)
+    own, _, gyroscope, level = lab.frame_sensor(lab.motion(12.0, pushed=False))
+    lab.ngimu(tmp_path / "day_frame.csv", own, gyroscope, level)
+    (trial,) = gather(tmp_path).trials
+    assert trial.manoeuvre == "coast"
+
+
 def test_any_table_comes_in_by_a_mapping_of_ones_own(tmp_path, run):
     time, wheels, torque = run
     at = np.arange(0.0, 30.0, 0.02)
@@ -285,6 +371,13 @@ def test_a_coast_is_a_coast_and_strokes_are_none(run):
     assert coasts(*_column(lab.motion(20.0, coast=0.2))) == []
 
 
+def test_pushes_are_counted_either_way_and_a_few_samples_hold_none(run):
+    time, wheels, _ = run
+    pull = np.gradient(wheels.mean(axis=1) * lab.RADIUS, time)[::10]
+    assert pushes(time[::10], pull + 0.5) == pushes(time[::10], -pull) > 10
+    assert pushes(np.arange(3.0), np.array([0.0, 5.0, 0.0])) == 0
+
+
 def _column(run):
     return run[0][::5], run[1][::5, 0]
 
@@ -305,6 +398,37 @@ def test_the_recording_that_ships_is_gathered_by_one_command(tmp_path, capsys):
     assert sorted(p.name for p in out.iterdir()) == files
 
 
+def test_a_study_that_cannot_be_read_is_named_by_its_own_folder(tmp_path, capsys, monkeypatch):
+    from mjchair.diagnosis.data import study_file
+
+    def refuse(folder):
+        raise MjchairError(f"{folder}/study.toml: not good")
+
+    monkeypatch.setattr(study_file, "read_study", refuse)
+    source, out = tmp_path / "mine", tmp_path / "study"
+    source.mkdir()
+    (source / "run.csv").write_bytes(samples.propulsion().read_bytes())
+    assert main(["gather", str(source), "--out", str(out), "--mass", "92"]) == 2
+    assert f"{out}/study.toml: not good" in capsys.readouterr().err
+
+
+def test_force_takes_the_tables_of_an_earlier_gather_away_and_no_other_file(tmp_path):
+    source, out = tmp_path / "mine", tmp_path / "study"
+    source.mkdir()
+    rolls = samples.propulsion().read_bytes()
+    (source / "first.csv").write_bytes(rolls)
+    command = ["gather", str(source), "--out", str(out), "--mass", "92", "--force"]
+    assert main(command) == 0
+    for name in ("mine.csv", "named.csv"):
+        (out / name).write_text("time,left_wheel\n0,1\n")
+    with (out / "study.toml").open("a") as study:
+        study.write('[[trial]]\nfile = "named.csv"\n')
+    (source / "first.csv").rename(source / "second.csv")
+    assert main(command) == 0
+    left = {path.name for path in out.glob("*.csv")}
+    assert left == {"mine.csv", "named.csv", "second.csv"}
+
+
 BAD = {
     "no folder": (["{empty}/none"], "no folder"),
     "nothing in it": (["{empty}"], "no file of a known kind"),
@@ -313,6 +437,12 @@ BAD = {
     "only a baseline": (["{rest}"], "a recording of an untouched rim, and none of the rim in use"),
     "heavy rider": (["{good}", "--rider-mass", "95", "--mass", "92"], "the rider weighs 95 kg"),
     "radius in mm": (["{good}", "--wheel-radius", "300"], "is it in mm?"),
+    "light together": (
+        ["{good}", "--mass", "18"],
+        "less the 15 kg of the model's chair",
+    ),
+    "light rider": (["{good}", "--mass", "18", "--chair-mass", "15"], "leaves 3 kg for the rider"),
+    "round brackets": (["{round}"], "a table has its units in [ ], as in 'time [ms]'"),
     "unknown floor": (["{good}", "--floor", "overgroud"], "did you mean 'overground'"),
     "no such file": (["{good}", "--offset", "imu.csv=3"], "--offset imu.csv: no such file"),
     "no offset": (["{good}", "--offset", "3"], "is not FILE=SECONDS"),
@@ -335,6 +465,7 @@ def bad_folders(tmp_path_factory):
         "good/run.csv": whole,
         "plan/run.csv": whole,
         "plan/gather.toml": '[files."run.csv"]\nsides = "left"\n',
+        "round/run.csv": "Time (ms),left_wheel_speed (rpm)\n0,0\n10,1\n20,2\n",
         "twice/a_left.csv": whole,
         "twice/left_a.csv": whole.replace("0.30", "0.31"),
     }

@@ -11,7 +11,7 @@ from lab_formats import write_c3d
 
 import mjchair
 from mjchair.cli import main
-from mjchair.errors import MjchairError
+from mjchair.errors import MjchairError, MjchairNote
 from mjchair.measurement.markers import Markers, read_markers
 from mjchair.motion import inverse_kinematics
 from mjchair.motion.capture import captured
@@ -175,11 +175,10 @@ def test_gaps_at_the_ends_are_not_bridged():
     assert np.isnan(out[[0, 4, 5], 0, 0]).all()
 
 
-def test_a_trc_file_is_the_c3d_file(truth, tmp_path):
-    names, positions, _ = truth
-    header = ["PathFileType\t4\t(X/Y/Z)\tx.trc", "DataRate\tNumMarkers\tUnits"]
+def trc(path, names, positions):
+    header = ["PathFileType\t4\t(X/Y/Z)\tx.trc", "DataRate\tNumFrames\tNumMarkers\tUnits"]
     header += [
-        f"{RATE}\t{len(names)}\tmm",
+        f"{RATE}\t{len(positions)}\t{len(names)}\tmm",
         "Frame#\tTime\t" + "\t\t\t".join(names),
         "\t\tX1\tY1\tZ1",
     ]
@@ -187,7 +186,24 @@ def test_a_trc_file_is_the_c3d_file(truth, tmp_path):
         "\t".join([str(k + 1), f"{k / RATE:.4f}", *(f"{1000 * v:.3f}" for v in frame.ravel())])
         for k, frame in enumerate(positions)
     ]
-    (tmp_path / "a.trc").write_text("\n".join([*header, "", *rows]) + "\n")
+    path.write_text("\n".join([*header, "", *rows]) + "\n")
+
+
+def test_a_trc_file_that_is_cut_off_is_said_and_its_broken_frame_left_out(truth, tmp_path):
+    names, positions, _ = truth
+    trc(tmp_path / "a.trc", names, positions)
+    text = (tmp_path / "a.trc").read_text()
+    lines = text.splitlines()
+    (tmp_path / "a.trc").write_text("\n".join(lines[:-10])[:-40])
+    said = f"tells {FRAMES} frames, and {FRAMES - 10} are there: it is cut off; the last one is not"
+    with pytest.warns(MjchairNote, match=said):
+        read = read_markers(tmp_path / "a.trc")
+    np.testing.assert_allclose(read.positions, positions[: FRAMES - 11], atol=1e-6)
+
+
+def test_a_trc_file_is_the_c3d_file(truth, tmp_path):
+    names, positions, _ = truth
+    trc(tmp_path / "a.trc", names, positions)
     read = read_markers(tmp_path / "a.trc")
     assert read.names == tuple(names)
     np.testing.assert_allclose(read.positions, positions, atol=1e-6)
@@ -256,6 +272,25 @@ def test_a_c3d_without_points_says_so(tmp_path):
     (tmp_path / "text.c3d").write_text("not a C3D")
     with pytest.raises(MjchairError, match="cannot read"):
         read_markers(tmp_path / "text.c3d")
+
+
+def test_a_marker_that_is_not_where_the_set_has_it_is_named(truth, tmp_path, capsys):
+    names, positions, _ = truth
+    off = positions.copy()
+    off[:, names.index("CLAV"), 0] += 0.3
+    run, out = c3d(tmp_path / "run.c3d", names, off), str(tmp_path / "rider.csv")
+    assert main(["rider", str(run), "--out", out]) == 0
+    (line,) = [x for x in capsys.readouterr().out.splitlines() if x.startswith("more than 80 mm")]
+    assert "CLAV" in line and "LFIN" not in line
+
+
+def test_a_static_trial_with_other_names_is_refused(truth, tmp_path):
+    names, positions, _ = truth
+    run = c3d(tmp_path / "run.c3d", names, positions)
+    static = c3d(tmp_path / "static.c3d", [f"other{k}" for k in range(len(names))], positions)
+    line = r"static\.c3d: the static trial has 0 of the .* markers of the person in .*run\.c3d"
+    with pytest.raises(MjchairError, match=line):
+        captured(run, static=static)
 
 
 def test_two_people_are_told_apart(truth, tmp_path):

@@ -128,6 +128,20 @@ def _offset(text: str) -> tuple[str, float]:
     return name, options.part_of(seconds, f"--offset {text}")
 
 
+def _earlier(folder: Path) -> list[Path]:
+    """The tables of an earlier gather: those that both its log and its study.toml name."""
+    from mjchair.measurement.gather.gather import LOG
+
+    log, study = folder / LOG, folder / "study.toml"
+    if not (log.is_file() and study.is_file()):
+        return []
+    lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
+    names = [f"{line.partition('  ')[0]}.csv" for line in lines]
+    text = study.read_text(encoding="utf-8", errors="replace")
+    named = [name for name in names if f'file = "{name}"' in text and "/" not in name]
+    return [folder / name for name in dict.fromkeys(named) if (folder / name).is_file()]
+
+
 def _write(gathered: Gathered, out: Path, force: bool) -> None:
     """Everything into a folder beside, read as a study, then moved; nothing half-written."""
     from mjchair.diagnosis.data.study_file import read_study
@@ -139,8 +153,13 @@ def _write(gathered: Gathered, out: Path, force: bool) -> None:
     with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}-") as beside:
         for name, text in gathered.files.items():
             write_whole(Path(beside) / name, text)
-        read_study(beside)
+        try:
+            read_study(beside)
+        except MjchairError as error:
+            raise MjchairError(str(error).replace(beside, str(out))) from None
         save(gathered_figure(gathered.trials), Path(beside) / PICTURE)
         folder = output_folder(out, force)
+        for file in _earlier(folder):
+            file.unlink()
         for file in sorted(Path(beside).iterdir()):
             shutil.move(file, folder / file.name)

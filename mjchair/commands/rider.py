@@ -35,7 +35,7 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 def run(args: argparse.Namespace) -> int:
     """Fit, print lengths and residuals, write the table and the film."""
     from mjchair.motion.capture import captured, table_text
-    from mjchair.motion.inverse_kinematics import Build
+    from mjchair.motion.inverse_kinematics import WORST, Build
     from mjchair.storage import check_new, write_whole
 
     out = check_new(args.out, args.force)
@@ -52,6 +52,13 @@ def run(args: argparse.Namespace) -> int:
         print(note)
     print("marker residuals, rms in mm:")
     print(", ".join(f"{name} {1e3 * value:.0f}" for name, value in motion.residuals.items()))
+    far = [name for name, value in motion.residuals.items() if value > WORST]
+    if far:
+        static = "" if args.static else "give the static trial of the person, or "
+        print(
+            f"more than {1e3 * WORST:.0f} mm off: {', '.join(far)}; they are not where the set has "
+            f"them: {static}do not trust the joints beside them"
+        )
     print(f"wrote {out}: {motion.time.size} samples, {motion.time[-1]:.1f} s")
     return 0
 

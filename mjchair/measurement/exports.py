@@ -18,6 +18,7 @@ of your own has the same keys:
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -29,6 +30,7 @@ from numpy.typing import NDArray
 
 from mjchair.errors import MjchairError, nearest
 from mjchair.measurement.delimited import Delimited
+from mjchair.measurement.notes import Detail
 from mjchair.toml_file import read_toml
 from mjchair.units import UNITS
 
@@ -36,6 +38,11 @@ Array = NDArray[np.float64]
 
 FORMATS = Path(__file__).with_name("formats")
 CLOCKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "100us": 1e-4}  # s a count; "samples": see its rate
+# such as "// Update Rate: 60.0Hz" or "OutputRate:,60Hz" in the lines before a header
+RATE = re.compile(
+    r"(?:update|sample|sampling|output|data)[ _]?(?:rate|frequency)\W*(\d+(?:\.\d+)?)\s*Hz",
+    re.IGNORECASE,
+)
 Positive = Annotated[float, Meta(gt=0)]
 
 
@@ -81,11 +88,13 @@ class Format:
     """What the columns of an export are; see the module's docstring.
 
     Attributes:
-      name: of the format. mapping: what its file says.
+      name: of the format. mapping: what its file says. own: whether it is a file of one's own,
+        whose rate is believed.
     """
 
     name: str
     mapping: ColumnMapping
+    own: bool = True
 
     def fits(self, file: Delimited) -> bool:
         """Whether a file is of this format."""
@@ -94,6 +103,16 @@ class Format:
         return all(_plain(c) in names for c in self.mapping.has) and any(
             word.lower() in line.lower() for line in (*file.preamble, "" if word else " ")
         )
+
+    def told(self, file: Delimited) -> bool:
+        """Whether the column of its clock holds times, where it has one."""
+        column = self.mapping.time.column
+        return column is None or bool(np.isfinite(_column(file, column)).any())
+
+    def alike(self, other: Format) -> bool:
+        """Whether another format has the same sensors in the same units."""
+        mine, theirs = self.mapping, other.mapping
+        return (mine.gyroscope, mine.accelerometer) == (theirs.gyroscope, theirs.accelerometer)
 
 
 @dataclass(frozen=True)
@@ -105,6 +124,8 @@ class Export:
         rad/s and m/s^2 in the instrument's axes; None: it has none. columns: study column -> (n,).
       trigger: time at which the trigger rises, s; None: it has none.
       format: its name. source: the file. notes: what was noticed, one line each.
+      assumed: rate, Hz, that its clock has by assumption alone; None: the file or a mapping of
+        one's own tells it.
     """
 
     time: Array
@@ -115,6 +136,7 @@ class Export:
     format: str
     source: str
     notes: tuple[str, ...] = field(default=())
+    assumed: float | None = None
 
 
 def read_formats(own: Sequence[Path] = ()) -> list[Format]:
@@ -123,31 +145,37 @@ def read_formats(own: Sequence[Path] = ()) -> list[Format]:
     Raises:
       MjchairError: a file that cannot be read or lacks a key.
     """
-    return [_format(path) for path in (*own, *sorted(FORMATS.glob("*.toml")))]
+    shipped = [_format(path, own=False) for path in sorted(FORMATS.glob("*.toml"))]
+    return [*(_format(path, own=True) for path in own), *shipped]
 
 
-def _format(path: Path) -> Format:
+def _format(path: Path, own: bool) -> Format:
     mapping = read_toml(path, ColumnMapping)
     clock = mapping.time
     if clock.rate is None and (clock.column is None or clock.unit == "samples"):
         raise MjchairError(f"{path}: time needs a column with a unit of time, or a rate in Hz")
-    return Format(path.stem, mapping)
+    return Format(path.stem, mapping, own)
 
 
 def matching(file: Delimited, formats: Sequence[Format]) -> Format | None:
-    """The first format that a file is of."""
-    return next((one for one in formats if file.header and one.fits(file)), None)
+    """The first format that a file is of; where its clock is blank, one alike that has another."""
+    fitting = [one for one in formats if file.header and one.fits(file)]
+    told = [one for one in fitting if one.told(file) and one.alike(fitting[0])]
+    return next(iter((*told, *fitting)), None)
 
 
 def read_export(file: Delimited, form: Format) -> Export:
     """What a file of a format holds.
 
     Raises:
-      MjchairError: a column or a unit that is not there, or a clock that stands still.
+      MjchairError: a column or a unit that is not there, or a clock that is blank or stands still.
     """
-    notes: list[str] = []
-    time = _time(file, form)
+    rate, assumed, notes = _rate(file, form)
+    time = _time(file, form, rate)
     good = np.isfinite(time)
+    if not good.any():
+        column = form.mapping.time.column
+        raise MjchairError(f"{file.source}: no cell of its time column {column!r} is filled")
     steps = np.r_[True, np.diff(time[good]) > 0.0]
     kept = np.flatnonzero(good)[steps]
     if kept.size < 2:
@@ -166,7 +194,29 @@ def read_export(file: Delimited, form: Format) -> Export:
         format=form.name,
         source=file.source,
         notes=tuple(notes),
+        assumed=assumed,
     )
+
+
+def _rate(file: Delimited, form: Format) -> tuple[float, float | None, list[str]]:
+    """Samples a second of a file that counts them, Hz, the same if it is assumed, and a note.
+
+    A mapping of one's own is believed, then the lines before the header, then the mapping that
+    comes along; NaN where the file has a clock.
+    """
+    rate, name = form.mapping.time.rate, Path(file.source).name
+    if rate is None:
+        return math.nan, None, []
+    if form.own:
+        return rate, None, []
+    found = next((m for line in file.preamble if (m := RATE.search(line))), None)
+    if found is not None and float(found[1]) > 0.0:
+        return float(found[1]), None, [Detail(f"{name}: {found[1]} Hz, as its first lines say")]
+    said = (
+        f"{name}: it has no clock and tells no rate; {rate:g} Hz is assumed, give yours with "
+        f"--mapping, in a copy of {form.name}.toml"
+    )
+    return rate, rate, [said]
 
 
 def _plain(name: str) -> str:
@@ -180,9 +230,8 @@ def _column(file: Delimited, name: str) -> Array:
     return file.values[:, names.index(_plain(name))]
 
 
-def _time(file: Delimited, form: Format) -> Array:
+def _time(file: Delimited, form: Format, rate: float) -> Array:
     clock = form.mapping.time
-    rate = math.nan if clock.rate is None else clock.rate
     if clock.column is None:
         return np.arange(len(file.values)) / rate
     time = _column(file, clock.column)

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mjchair.errors import MjchairError
+from mjchair.errors import MjchairError, note
 from mjchair.measurement.delimited import read_text
 
 Array = NDArray[np.float64]
@@ -125,10 +125,24 @@ def _read_trc(path: Path) -> Markers:
     rows = [_trc_row(line, len(names), f"{path}: row {i}") for i, line in _numbered(lines)]
     if not rows:
         raise MjchairError(f"{path}: a TRC without frames")
+    rows = _whole(rows, lines, told.get("NumFrames", ""), path)
     data = np.array(rows)
     factor = _factor(told.get("Units", "mm"), path)
     positions = factor * data[:, 1:].reshape(len(data), len(names), 3)
     return Markers(data[:, 0] - data[0, 0], tuple(names), positions, str(path))
+
+
+def _whole(rows: list[list[float]], lines: list[str], frames: str, path: Path) -> list[list[float]]:
+    """The frames of a TRC; of a file that is cut off without its last one, and with a note."""
+    if not frames.strip().isdigit() or len(rows) >= int(frames) or len(rows) < 2:
+        return rows
+    last = max(line.count("\t") for _, line in _numbered(lines))
+    broken = _numbered(lines)[-1][1].count("\t") < last
+    note(
+        f"{path}: its header tells {int(frames)} frames, and {len(rows)} are there: it is cut off"
+        + ("; the last one is not whole and is left out" if broken else "")
+    )
+    return rows[:-1] if broken else rows
 
 
 def _numbered(lines: Sequence[str]) -> list[tuple[int, str]]:

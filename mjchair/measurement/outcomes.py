@@ -13,14 +13,14 @@ stands for it, on a push rim of 0.27 m.
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mjchair.errors import MjchairError, nearest
+from mjchair.errors import MjchairError, nearest, note
 from mjchair.measurement.smartwheel import PushRim
 from mjchair.measurement.trial import Trial
 from mjchair.simulation.recording import Recording
@@ -324,8 +324,14 @@ def _has_time(path: Path) -> bool:
 
 
 def _trial(path: Path) -> Trial:
+    from mjchair.measurement.table_wheels import put_right
     from mjchair.measurement.trial import trial_from_table
     from mjchair.model.spec import load_spec
     from mjchair.simulation.table import read_table
 
-    return trial_from_table(read_table(path), load_spec("manual").compile(), path.stem)
+    table = read_table(path)
+    columns, said = put_right(table.time, table.columns, path.name)
+    for line in said:
+        note(line)
+    table = replace(table, columns=columns)
+    return trial_from_table(table, load_spec("manual").compile(), path.stem)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from mjchair.errors import MjchairError
 from mjchair.measurement.markers import Markers, read_markers
 from mjchair.motion.chair_frame import bridged, in_chair
 from mjchair.motion.inverse_kinematics import Build, Motion, fit, lengths_of
-from mjchair.motion.marker_set import MarkerSet, find_marker_set, read_marker_set
+from mjchair.motion.marker_set import LEAST, MarkerSet, find_marker_set, read_marker_set
 
 ALIKE = 0.12  # share by which arms of one person may differ between two trials
 
@@ -74,12 +74,25 @@ def _captured(
 
 def _static(still: Markers, run: Markers, chosen: MarkerSet) -> np.ndarray:
     """The static trial in the chair's axes, its markers in the order of the run's."""
+    _check_names(still, run, chosen.of(run.names).body)
     placed = in_chair(still, chosen.of(still.names)).positions
     out = np.full((len(placed), len(run.names), 3), np.nan)
     for k, name in enumerate(run.names):
         if name in still.names:
             out[:, k] = placed[:, still.names.index(name)]
     return out
+
+
+def _check_names(still: Markers, run: Markers, wanted: Sequence[str]) -> None:
+    """Refuse a static trial that lacks nearly all markers of the person in the run."""
+    there = [name for name in wanted if name in still.names]
+    if len(there) < LEAST:
+        lacks = ", ".join([name for name in wanted if name not in there][:4])
+        raise MjchairError(
+            f"{still.source}: the static trial has {len(there)} of the {len(wanted)} markers of "
+            f"the person in {run.source} (it lacks {lacks} ...): its markers have other names, "
+            "or it is of another person"
+        )
 
 
 def _check_person(

@@ -20,6 +20,8 @@ GAINS = 0.06  # m/s^2, above which something drives; a bump gives less over a qu
 BRAKES = 1.0  # m/s^2, beyond which something brakes
 EVEN = 0.20  # m/s^2, within which a coast's deceleration stays about its middle
 CUTOFF = 2.0  # Hz, of the speed that is judged
+PUSH, PUSHED = 0.3, 0.1  # m/s^2 and s, which a push is at least; a coast's slowing is below it
+FEW = 10  # samples, of which none tells a push
 MARGIN = 0.15  # s, left out at both ends
 
 
@@ -41,6 +43,26 @@ def coasts(time: Array, speed: Array) -> list[tuple[float, float]]:
     for first, last in _runs(free):
         found += _even_parts(even, gained, first, last)
     return found
+
+
+def pushes(time: Array, pull: Array) -> int:
+    """How often a chair is pushed, by its acceleration along the way alone.
+
+    Args:
+      time: (n,), s. pull: (n,), m/s^2, forward or backward positive, with any offset.
+    """
+    if time.size < FEW:
+        return 0
+    even = np.linspace(time[0], time[-1], max(FEW, min(time.size, int(200.0 * np.ptp(time)))))
+    rate = 1.0 / float(even[1] - even[0])
+    sos = butter(2, min(CUTOFF, 0.4 * rate), fs=rate, output="sos")
+    smooth = sosfiltfilt(sos, np.interp(even, time, pull), padlen=min(100, even.size - 2))
+    smooth = smooth - np.median(smooth)
+    counts = []
+    for way in (1.0, -1.0):
+        parts = _runs(way * smooth > PUSH)
+        counts.append(sum(bool(even[b] - even[a] >= PUSHED) for a, b in parts))
+    return max(counts)
 
 
 def _runs(flag: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.errors import MjchairError, nearest, note
-from mjchair.measurement.gather.coasts import coasts
+from mjchair.measurement.gather.coasts import coasts, pushes
 from mjchair.measurement.gather.instruments import (
     RIDER_COLUMNS,
     ReadsMarkers,
@@ -34,6 +34,7 @@ QUIET = 0.5  # s at rest, the least from which noise is read
 RESTS = 0.05  # rad/s of a wheel, below which the chair stands
 STEP = 2.0 * np.pi / 4096  # rad, of the encoders in use
 EVEN, FEW = 0.2, 6.4  # of a step, within which readings come in whole steps, of so many at most
+MANY = 3  # pushes that make a run a pushed one; one or two set a coast going
 RUNS_OFF_FLOOR = ("rollers",)  # floors on which the chair itself does not move
 
 
@@ -174,6 +175,7 @@ def _usable(trial: GatheredTrial, known: Known) -> list[GatheredTrial]:
         return [trial]
     motion = next((one for one in trial.instruments if one.speed is not None), None)
     if motion is None or motion.speed is None:
+        _check_unpushed(trial)
         said = f"{trial.name}: no wheel's motion; it is taken as a coast throughout"
         return [replace(trial, notes=(*trial.notes, said))]
     parts = coasts(motion.time, motion.speed)
@@ -191,6 +193,21 @@ def _usable(trial: GatheredTrial, known: Known) -> list[GatheredTrial]:
         _cut(trial, f"{trial.name}_coast{k}", (a - trial.begin, b - trial.begin), said)
         for k, (a, b) in enumerate(parts, start=1)
     ]
+
+
+def _check_unpushed(trial: GatheredTrial) -> None:
+    """Refuse a run that is pushed, of which nothing tells how a wheel turns or is driven."""
+    pull = trial.columns.get("imu_accelerometer.x")
+    if pull is None:
+        return
+    seen = np.isfinite(pull)
+    count = pushes(trial.time[seen], pull[seen])
+    if count >= MANY:
+        names = ", ".join(one.name for one in trial.instruments)
+        raise MjchairError(
+            f"trial {trial.name!r}: {names} shows {count} pushes, and no file tells how a wheel "
+            "turns or what drives it; add a wheel's file, or cut this one to where it rolls freely"
+        )
 
 
 def _cut(trial: GatheredTrial, name: str, span: tuple[float, float], said: str) -> GatheredTrial:

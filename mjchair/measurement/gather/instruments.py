@@ -12,11 +12,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from mjchair.errors import MjchairError
 from mjchair.measurement import baseline as baselines
-from mjchair.measurement import imu, smartwheel
+from mjchair.measurement import imu, smartwheel, table_wheels
 from mjchair.measurement.exports import read_export
 from mjchair.measurement.gather.sources import Source
 from mjchair.measurement.notes import Detail, about
@@ -28,7 +27,6 @@ Array = NDArray[np.float64]
 
 OTHER = {"left": "right", "right": "left"}
 COAST = 0.98  # share of a rolling recording without a hand, above which it is a coast
-SMOOTH = 0.1  # s, of the local parabola that turns a table's angle into speed
 CHAIR_SPEED = "chair_speed"  # m/s, a column of a rider's motion
 CHAIR_HEADING = "chair_heading"  # rad, in the laboratory, the same
 RIDER_COLUMNS = {*JOINT_NAMES, "rider_motion", CHAIR_SPEED, CHAIR_HEADING}
@@ -50,7 +48,8 @@ class Instrument:
       trigger: time at which its trigger rises, s; None. free: (n,), without a hand; None.
       radius: of the wheel, m, from the file; None. ground: (n,) m/s, of the chair over the floor,
         by markers; None. facing: (n,) rad, of its forward axis in the laboratory, the same.
-        doubted: whether its signs are those of a wheel of the other side.
+        doubted: whether its signs are those of a wheel of the other side. assumed: rate, Hz, that
+        its clock has by assumption; None: it is known.
       notes: one line each.
     """
 
@@ -69,6 +68,7 @@ class Instrument:
     ground: Array | None = None
     facing: Array | None = None
     doubted: bool = False
+    assumed: float | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -291,7 +291,7 @@ def _imu(source: Source) -> Instrument:
         notes.append(Detail(sits))
         return Instrument(
             name, source, export.time, {f"{side}_wheel_speed": speed}, {}, speed, side,
-            trigger=export.trigger, notes=tuple(notes),
+            trigger=export.trigger, notes=tuple(notes), assumed=export.assumed,
         )  # fmt: skip
     accelerometer = export.accelerometer
     if accelerometer is not None:
@@ -299,7 +299,7 @@ def _imu(source: Source) -> Instrument:
         notes += [said] if said else []
     return Instrument(
         name, source, export.time, gyroscope=gyroscope, accelerometer=accelerometer,
-        trigger=export.trigger, notes=tuple(notes),
+        trigger=export.trigger, notes=tuple(notes), assumed=export.assumed,
     )  # fmt: skip
 
 
@@ -310,6 +310,7 @@ def _short(path: Path) -> str:
 
 def _table(source: Source) -> Instrument:
     """A table whose columns are a study's, by name or by a mapping."""
+    export = None
     if source.format is not None and source.file is not None:
         export = read_export(source.file, source.format)
         time, columns, trigger = export.time, dict(export.columns), export.trigger
@@ -318,33 +319,21 @@ def _table(source: Source) -> Instrument:
         if RIDER_COLUMNS & set(table.columns) and not _of_wheel(table):
             return _rider(source, table)
         time, columns, trigger = np.asarray(table.time), dict(table.columns), None
+    columns, notes = table_wheels.put_right(time, columns, source.path.name, export is None)
+    notes = [*export.notes, *notes] if export is not None else notes
     wheels: tuple[str, ...] = ("left_wheel", "right_wheel")
     torque = {name: columns.pop(name) for name in wheels if name in columns}
-    side, speed = "", None
-    for one in ("left", "right"):
-        if speed is None and f"{one}_wheel_speed" in columns:
-            side, speed = one, _filled(time, columns[f"{one}_wheel_speed"])
-        if speed is None and f"{one}_wheel_angle" in columns:
-            side, speed = one, _rate(time, _filled(time, columns[f"{one}_wheel_angle"]))
-    return Instrument(source.path.name, source, time, columns, torque, speed, side, trigger=trigger)
+    courses = {one: table_wheels.motion(time, columns, one) for one in ("left", "right")}
+    side = next((one for one, speed in courses.items() if speed is not None), "")
+    return Instrument(
+        source.path.name, source, time, columns, torque, courses.get(side), side,
+        trigger=trigger, notes=tuple(notes),
+    )  # fmt: skip
 
 
 def _of_wheel(table: Table) -> bool:
     """Whether a table has anything that an instrument on the chair measures."""
     return any(name not in RIDER_COLUMNS for name in table.columns)
-
-
-def _filled(time: Array, values: Array) -> Array:
-    there = np.isfinite(values)
-    return np.interp(time, time[there], values[there])
-
-
-def _rate(time: Array, angle: Array) -> Array:
-    step = float(np.median(np.diff(time)))
-    window = min(2 * max(1, round(0.5 * SMOOTH / step)) + 1, 2 * ((time.size - 1) // 2) + 1)
-    if window < 5:
-        return np.asarray(np.gradient(angle, time))
-    return np.asarray(savgol_filter(angle, window, 2, deriv=1, delta=step))
 
 
 def shifted(instrument: Instrument, time: Array, notes: Sequence[str] = ()) -> Instrument:

@@ -123,10 +123,19 @@ def _align(ours: Sequence[Instrument], other: Instrument) -> Alignment:
         first, second = (float(np.median(np.diff(one.time))) for one in (reference, other))
         spread = float(np.hypot(first, second) / np.sqrt(12.0))
         return Alignment(reference.trigger - other.trigger, spread, how="trigger")
-    found = _by_motion(ours, other)
+    try:
+        found = _by_motion(ours, other)
+    except MjchairError as error:
+        raise MjchairError(f"{error}{_assumed(reference, other)}") from None
     if found.drift != 0.0:
         return found
     return _by_course(reference, other, found) or found
+
+
+def _assumed(*pair: Instrument) -> str:
+    """What a line on clocks must say of rates that are assumed."""
+    read = [f"{one.name} is read at {one.assumed:g} Hz" for one in pair if one.assumed is not None]
+    return f"; {' and '.join(read)}, which is assumed; give its rate with --mapping" * bool(read)
 
 
 def _by_motion(ours: Sequence[Instrument], other: Instrument) -> Alignment:

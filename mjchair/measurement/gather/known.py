@@ -19,6 +19,7 @@ RANGES = {  # name -> unit, least, most
     "wheel_radius": ("m", 0.10, 0.36),
     "grade": ("1", -0.3, 0.3),
 }
+MODEL_CHAIR = 15.0  # kg, of the model's chair, where nobody says what a chair weighs
 ASKED = {
     "rider_mass": "mass of the person with clothes, kg (--rider-mass)",
     "chair_mass": "mass of the chair with wheels and all that is fixed to it, kg (--chair-mass)",
@@ -63,21 +64,36 @@ class Known:
     def _masses(self) -> None:
         if self.mass is None:
             return
+        if self.rider_mass is None and self.chair_mass is None:
+            self._check_rest("rider_mass", MODEL_CHAIR, "of the model's chair")
         for name, other in (("rider_mass", "chair_mass"), ("chair_mass", "rider_mass")):
             part = getattr(self, name)
             if part is None:
                 continue
+            who = "the rider weighs" if name == "rider_mass" else "the chair weighs"
             if part >= self.mass:
-                who = "the rider weighs" if name == "rider_mass" else "the chair weighs"
                 raise MjchairError(f"{who} {part:g} kg and both together {self.mass:g} kg")
             rest = getattr(self, other)
             if rest is None:
+                self._check_rest(other, part, f"that {who}")
                 object.__setattr__(self, other, self.mass - part)
             elif abs(rest + part - self.mass) > 0.5:
                 raise MjchairError(
                     f"rider {self.rider_mass:g} kg and chair {self.chair_mass:g} kg are not "
                     f"{self.mass:g} kg together; give two of the three"
                 )
+
+    def _check_rest(self, name: str, part: float, of: str) -> None:
+        """Refuse a total that leaves too little or too much for a rider or a chair, kg."""
+        _, low, high = RANGES[name]
+        rest = (self.mass or 0.0) - part
+        if not low <= rest <= high:
+            who = name.removesuffix("_mass")
+            raise MjchairError(
+                f"--mass is {self.mass:g} kg; less the {part:g} kg {of} it leaves "
+                f"{rest:g} kg for the {who}, which must be {low:g} to {high:g}; "
+                "give --rider-mass and --chair-mass"
+            )
 
     def missing(self, radius: float | None) -> tuple[str, ...]:
         """What is still not known, in words with its flag.

@@ -63,6 +63,11 @@ INSTRUMENTS = {
     *("calinertialandmag", "inertial", "sensors", "csv", "data", "export"),
 }
 PAPERS = {"license", "licence", "notice", "readme", "copying"}
+# what sensors of Xsens add to a name: MT_0120034-001, MT_012005D6-000_00B4C3A2, D422CD006044
+TAG = re.compile(
+    r"(?<![A-Za-z0-9])(?:MT_[0-9A-F]{6,8}(?:-\d{3})*(?:_[0-9A-F]{8})?"
+    r"|(?=[0-9]*[A-F])(?=[A-F]*[0-9])(?:[0-9A-F]{8}|[0-9A-F]{12}))(?![A-Za-z0-9])"
+)
 WHOLE = "run"  # the trial of files whose names tell none
 
 
@@ -135,6 +140,7 @@ def find_sources(folder: Path, mappings: Sequence[Path] = ()) -> Found:
     if not sources:
         lines = "; ".join(unused[:3]) or f"there is none that ends in {', '.join(SUFFIXES)}"
         raise MjchairError(f"{folder}: no file of a known kind: {lines}")
+    sources = _without_tags(sources, plan, folder)
     return Found(tuple(_one_trial(sources, plan)), tuple(unused))
 
 
@@ -196,6 +202,9 @@ def _kind(
     if file.values.shape[1] in (24, 25):
         return "smartwheel", None, file, ""
     columns = ", ".join(file.header[:4]) or f"{file.values.shape[1]} columns without names"
+    if file.header and file.header[0].lower().split("(")[0].strip() == "time":
+        why = f"its first column is {file.header[0]!r}; a table has its units in [ ], as in "
+        return "", None, None, f"{why}'time [ms]', or write a mapping, see docs/your_data.md"
     return (
         "",
         None,
@@ -240,6 +249,28 @@ def _trial(inside: Path) -> str:
     """What is left of a file's name without words of sides, places and instruments."""
     dropped = {*SIDES, *PLACES, *BASELINE, *STILL, *INSTRUMENTS, *GENERIC}
     return "_".join(word for word in _words(inside) if word not in dropped) or WHOLE
+
+
+def _without_tags(sources: Sequence[Source], plan: Mapping[str, Any], folder: Path) -> list[Source]:
+    """The sources, those of a sensor in the trial that its name tells without the sensor's tag.
+
+    Not where a name is a tag alone, or where one sensor left two files of that trial, so that only
+    the number in the tag tells them apart.
+    """
+    short: dict[int, tuple[str, str]] = {}
+    for k, source in enumerate(sources):
+        inside = source.path.relative_to(folder)
+        tag = TAG.search(inside.stem)
+        if source.kind != "imu" or tag is None or "trial" in plan.get(str(inside), {}):
+            continue
+        name = _trial(inside.with_name(TAG.sub("", inside.stem) + inside.suffix))
+        if name != WHOLE:
+            short[k] = name, re.sub(r"-\d{3}", "", tag[0])
+    times = Counter(short.values())
+    return [
+        replace(source, trial=short[k][0]) if times[short.get(k, ("", ""))] == 1 else source
+        for k, source in enumerate(sources)
+    ]
 
 
 def _one_trial(sources: list[Source], plan: Mapping[str, Any]) -> list[Source]:

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 from mjchair.measurement.gather.instruments import RIDER_COLUMNS
 from mjchair.measurement.gather.join import GatheredTrial
-from mjchair.measurement.gather.known import Known
+from mjchair.measurement.gather.known import MODEL_CHAIR, Known
 from mjchair.rider.anatomy import JOINT_NAMES
 
 LOOSE = 0.3  # relative standard deviation of a mass that nobody has weighed
@@ -96,8 +96,8 @@ def _masses(known: Known) -> list[str]:
     if known.rider_mass is None and known.chair_mass is None and known.mass is not None:
         return [
             _line(
-                f"occupant_mass = {known.mass - 15.0:g}",
-                f"kg; {known.mass:g} kg together, less the 15 kg of the model's chair",
+                f"occupant_mass = {known.mass - MODEL_CHAIR:g}",
+                f"kg; {known.mass:g} kg together, less the {MODEL_CHAIR:g} kg of the model's chair",
             )
         ]
     rider = (
