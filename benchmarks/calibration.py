@@ -17,7 +17,7 @@ import argparse
 import datetime
 import json
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -163,7 +163,7 @@ def _with_factors(raw: Calibration, studies: Sequence[Drawn]) -> Calibration:
     found = {}
     for name in CLUED:
         told = [
-            (list(clues(s.weights, s.chosen.name).values()), holds(s.truth, s.chosen.name))
+            (_in_order(clues(s.weights, s.chosen.name)), holds(s.truth, s.chosen.name))
             for s in studies
             if s.chosen and kind(s.chosen.name, s.chosen) == name
         ]
@@ -173,6 +173,11 @@ def _with_factors(raw: Calibration, studies: Sequence[Drawn]) -> Calibration:
         }
         found[name] = msgspec.structs.replace(getattr(raw, name), by=kept)
     return msgspec.structs.replace(raw, **found)
+
+
+def _in_order(known: Mapping[str, float]) -> list[float]:
+    """Clues in the order of CLUES."""
+    return [known[clue] for clue in CLUES]
 
 
 def _factors(told: Array, right: Array) -> Array:

@@ -24,6 +24,7 @@ from scipy.signal import savgol_filter
 import mjchair
 from mjchair.cli import main as mjchair_command
 from mjchair.diagnosis.fit.nonlinear import Fitted
+from mjchair.diagnosis.replay import strokes
 from mjchair.diagnosis.replay.sampling import residual
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 
@@ -37,7 +38,6 @@ COVERED = 0.8  # of a stroke
 SMOOTH = 41  # samples over which a speed is taken: a cut at about 6 Hz
 EDGE = 10  # samples at each end of a window that the smoothing spoils
 CHANNEL = "left_wheel_angle"
-RISES = 5.0  # N m, through which a stroke begins
 
 
 def cut_in_two(folder: Path, hold: str) -> None:
@@ -117,9 +117,7 @@ def main() -> None:
     print(diagnosis.verdict, names)
     base, choice = diagnosis.stages.base, diagnosis.stages.choice
     simulator = base.bench.simulator
-    held = next(r for r in simulator.study.runs if r.hold_out).trial
-    torque = held.inputs.at("left_wheel", held.inputs.time)
-    begins = held.inputs.time[1:][(torque[1:] >= RISES) & (torque[:-1] < RISES)]
+    begins = strokes.beginnings(next(r for r in simulator.study.runs if r.hold_out))
     fits = [("rigid", base.plain)] + ([("moving", choice.fitted)] if choice else [])
     for name, fitted in fits:
         told = speeds(simulator, fitted)

@@ -141,8 +141,12 @@ def _spun(time: Array, columns: Mapping[str, Array], wheels: Mapping[str, _Wheel
     if yaw is None or len(wheels) < 2:
         return None
     told = YAW * (wheels["right"].net - wheels["left"].net)
-    share = float(np.trapezoid(_filled(time, yaw), time)) / told if abs(told) > ROLLS else 0.5
-    return True if share > SEEN else False if abs(share) < UNSEEN else None
+    if abs(told) <= ROLLS:
+        return None
+    share = float(np.trapezoid(_filled(time, yaw), time)) / told
+    if share > SEEN:
+        return True
+    return False if abs(share) < UNSEEN else None
 
 
 def _turned(wheel: _Wheel, other: _Wheel | None, spun: bool | None) -> tuple[int, int, str]:

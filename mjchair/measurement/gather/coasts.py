@@ -33,10 +33,7 @@ def coasts(time: Array, speed: Array) -> list[tuple[float, float]]:
     """
     step = float(np.median(np.diff(time)))
     even = np.arange(time[0], time[-1], max(step, 0.005))
-    rate = 1.0 / float(even[1] - even[0])
-    values = np.interp(even, time, speed)
-    sos = butter(2, min(CUTOFF, 0.4 * rate), fs=rate, output="sos")
-    smooth = sosfiltfilt(sos, values, padlen=min(100, even.size - 2))
+    smooth = smoothed(even, np.interp(even, time, speed))
     gained = RADIUS * np.gradient(np.abs(smooth), even)
     free = (gained < GAINS) & (gained > -BRAKES) & (np.abs(smooth) > SLOWEST)
     found = []
@@ -54,15 +51,20 @@ def pushes(time: Array, pull: Array) -> int:
     if time.size < FEW:
         return 0
     even = np.linspace(time[0], time[-1], max(FEW, min(time.size, int(200.0 * np.ptp(time)))))
-    rate = 1.0 / float(even[1] - even[0])
-    sos = butter(2, min(CUTOFF, 0.4 * rate), fs=rate, output="sos")
-    smooth = sosfiltfilt(sos, np.interp(even, time, pull), padlen=min(100, even.size - 2))
+    smooth = smoothed(even, np.interp(even, time, pull))
     smooth = smooth - np.median(smooth)
     counts = []
     for way in (1.0, -1.0):
         parts = _runs(way * smooth > PUSH)
         counts.append(sum(bool(even[b] - even[a] >= PUSHED) for a, b in parts))
     return max(counts)
+
+
+def smoothed(even: Array, values: Array) -> Array:
+    """Values (n,) at even times (n,), s, below CUTOFF, without a lag."""
+    rate = 1.0 / float(even[1] - even[0])
+    sos = butter(2, min(CUTOFF, 0.4 * rate), fs=rate, output="sos")
+    return np.asarray(sosfiltfilt(sos, values, padlen=min(100, even.size - 2)))
 
 
 def _runs(flag: NDArray[np.bool_]) -> list[tuple[int, int]]:

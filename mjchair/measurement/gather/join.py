@@ -135,7 +135,9 @@ def _align(ours: Sequence[Instrument], other: Instrument) -> Alignment:
 def _assumed(*pair: Instrument) -> str:
     """What a line on clocks must say of rates that are assumed."""
     read = [f"{one.name} is read at {one.assumed:g} Hz" for one in pair if one.assumed is not None]
-    return f"; {' and '.join(read)}, which is assumed; give its rate with --mapping" * bool(read)
+    if not read:
+        return ""
+    return f"; {' and '.join(read)}, which is assumed; give its rate with --mapping"
 
 
 def _by_motion(ours: Sequence[Instrument], other: Instrument) -> Alignment:
