@@ -206,6 +206,16 @@ def test_one_reading_of_noise_is_no_hand(rims):
     assert not hands_off(dataclasses.replace(run, forces=forces))[890:1010].any()
 
 
+def test_a_weak_start_from_rest_is_no_coast(rims):
+    # The trunk moves the chair most where the hands are off, and the wheel passes half a turn.
+    raw, _ = rims(person=Person(torque=10.0), pushes=1, coasts=1, seconds=10.0)
+    trials = {trial.name: trial for trial in gather(raw, Known()).trials}
+    assert trials["push1"].driven
+    assert not trials["coast1"].driven
+    free = {one.side: one.free.mean() for one in trials["push1"].instruments}
+    assert all(0.5 < share < 0.65 for share in free.values())
+
+
 def test_lines_that_repeat_are_said_once():
     said = once(["a.csv: 3.5 turns", "b: left", "c.csv: 4.5 turns", "one for all: 2", "b: left"])
     assert said == ["a.csv, c.csv: 3.5 to 4.5 turns", "b: left", "one for all: 2"]

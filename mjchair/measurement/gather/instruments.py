@@ -26,6 +26,7 @@ from mjchair.simulation.table import Table, read_table
 Array = NDArray[np.float64]
 
 OTHER = {"left": "right", "right": "left"}
+ROLLING = 0.3  # rad/s, above which a wheel is taken to roll
 COAST = 0.98  # share of a rolling recording without a hand, above which it is a coast
 CHAIR_SPEED = "chair_speed"  # m/s, a column of a rider's motion
 CHAIR_HEADING = "chair_heading"  # rad, in the laboratory, the same
@@ -215,8 +216,9 @@ def _wheel(
     """An instrumented wheel: angle, and the hand's torque where there was a hand."""
     side, signs, why = told
     base = baselines.choose(run, rest)
-    free = baselines.hands_off(run)
-    clean = smartwheel.turned(baselines.take_off(run, base), signs)
+    bare = baselines.take_off(run, base)
+    free = baselines.hands_off(bare)
+    clean = smartwheel.turned(bare, signs)
     name = source.path.name
     wheel = f"{name}: {side} wheel; {_signs_text(signs)}"
     notes = [*run.notes, f"{wheel}; {why}" if why else Detail(wheel)]
@@ -228,9 +230,10 @@ def _wheel(
     notes.append(Detail(taken))
     if clean.angle[-1] - clean.angle[0] < -smartwheel.ROLLS:
         notes.append(f"{name}: rolls backwards on balance")
-    rolling = np.abs(clean.speed) > 0.3
+    # From the first roll to the last: at the start from rest a hand pushes while the wheel is slow.
+    rolling = np.flatnonzero(np.abs(clean.speed) > ROLLING)
     torque = {f"{side}_wheel": clean.torque}
-    if rolling.any() and free[rolling].mean() > COAST:
+    if rolling.size and free[rolling[0] : rolling[-1] + 1].mean() > COAST:
         torque = {}
         notes.append(Detail(f"{name}: no hand on the rim; a coast, its torque is left out"))
     return Instrument(
