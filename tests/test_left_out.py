@@ -15,6 +15,7 @@ from mjchair.diagnosis.explain.screening import prepare, screen_columns
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import RoughlyKnown
 from mjchair.diagnosis.fit.system import System
+from mjchair.diagnosis.next_experiment import wording
 from mjchair.simulation.initial import Initial
 
 ROWS = 40
@@ -150,3 +151,19 @@ def test_what_no_number_makes_stays_a_gap(size):
     rng = np.random.default_rng(11)
     told, _ = foretold(rng, [[1.0, size], [1.0, 3.0]], missing=3.0)
     assert told > 5.0
+
+
+def test_a_held_out_run_that_alone_shows_what_is_missing_is_told(monkeypatch):
+    names = ["coast", "turn"]
+    runs = [SimpleNamespace(hold_out=n == "turn", trial=SimpleNamespace(name=n)) for n in names]
+    simulator = SimpleNamespace(
+        windows=[SimpleNamespace(run=k) for k in (0, 0, 1)], study=SimpleNamespace(runs=runs)
+    )
+    base = SimpleNamespace(bench=SimpleNamespace(simulator=simulator))
+    cells = [SimpleNamespace(total=40.0, total_dof=10.0)] * 3
+    fitted = SimpleNamespace(system=SimpleNamespace(cells=cells))
+    for left, said in ((7.0, ("turn", 7.0, 2.0)), (5.0, None)):
+        monkeypatch.setattr(left_out, "_foretold", lambda *_, left=left: (10.0 * left**2, 10.0))
+        found = left_out.lone_run(base, fitted)
+        assert found == said
+    assert "Hold out another run than turn" in wording.letting_in("turn", 7.0, 2.0)

@@ -24,6 +24,7 @@ from mjchair.diagnosis.explain.left_out import (
     held_out,
     held_out_gain,
     held_windows,
+    lone_run,
     on_held_out,
     slow_part,
 )
@@ -97,7 +98,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         candidates=_candidates(base, gap, choice),
         gap=_summary(base, gap, named),
         where=_where(base),
-        next_experiment=_following(base, said, plan, left),
+        next_experiment=_following(base, choice, said, plan, left),
         notes=[*_notes(base, choice, closed, said, left), *unplanned],
         drivers=left,
         nearest=_nearest(base, choice, closed) if choice and said == Verdict.UNKNOWN else None,
@@ -210,11 +211,20 @@ def _plan(base: Base, choice: Choice, once: bool) -> tuple[Plan | None, list[str
     return plan, list(plan.dropped)
 
 
-def _following(base: Base, said: Verdict, plan: Plan | None, left: list[MissingForce]) -> str:
+def _following(
+    base: Base,
+    choice: Choice | None,
+    said: Verdict,
+    plan: Plan | None,
+    left: list[MissingForce],
+) -> str:
     """The next experiment in words; empty where none is needed."""
     if plan is not None:
         return wording.deciding(plan, base.bench.simulator)
     if said == Verdict.UNKNOWN:
+        lone = lone_run(base, choice.fitted if choice else base.plain)
+        if lone is not None:
+            return wording.letting_in(*lone)
         return wording.searching([(force.goes_with, force.sigmas) for force in left])
     if said == Verdict.NONE:
         known = base.plain.variant.known_roughly
@@ -381,7 +391,8 @@ def _notes(
     if choice is not None:
         names = " and ".join(t.effect.key for t in choice.fitted.variant.terms)
         notes.append(
-            f"nothing in the library explains the gap; the nearest, {names}, closes {closed:.0%}"
+            f"nothing in the library explains the gap; the nearest, {names}, closes {closed:.0%} "
+            "of it on the runs that it was fitted to"
         )
     if any(force.goes_with.quantity == Quantity.STROKE for force in left[:TOP]):
         notes.append(

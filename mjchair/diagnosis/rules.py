@@ -59,6 +59,7 @@ SMALL_GAP = 2.0  # rms of the residual over the noise up to which a gap may be n
 SHOWS = 2.0  # standard deviations of the whole residual: less is no more than noise
 CERTAIN = 10.0  # standard errors beyond which an effect is named whatever its size
 MATERIAL = 0.12  # of the chair's own rolling resistance: a force that matters (assumption)
+LONE = 3.0  # times what any run of the fit leaves: only a held-out run shows it (assumption)
 # what happens once
 CARRIES = 0.8  # share of the gain that an event must bring to stand beside an effect
 # what is believed of a parameter
@@ -420,6 +421,15 @@ def is_stuck(*, total: float, promised: float) -> bool:
 def has_settled(*, total: float, promised: float) -> bool:
     """Whether a fit is, but for a small share of what it leaves, where its own step leads."""
     return total - promised <= max(RIVAL_CHI2, SHORT * total)
+
+
+def shows_alone(*, held: float, others: float) -> bool:
+    """Whether a held-out run shows what no run of the fit does.
+
+    Args:
+      held: rms over the noise that it leaves. others: the most that a run of the fit leaves.
+    """
+    return held > LONE * max(others, 1.0)
 
 
 def columns_hold(*, gain: float, missed: float) -> bool:

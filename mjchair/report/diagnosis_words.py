@@ -277,9 +277,11 @@ def nearest_words(diagnosis: Diagnosis) -> str:
     if near is None:
         return ""
     names = " with ".join(plain(key) for key in near.effects)
+    gap = diagnosis.gap
+    held = " on the held-out ones" if gap is not None and "held-out" in gap.scope else ""
     return (
-        f"The nearest, {names}, closes {near.closure:.0%} of the gap and leaves "
-        f"{size(near.remainder)} times the noise. "
+        f"The nearest, {names}, closes {near.closure:.0%} of the gap on the runs that it was "
+        f"fitted to and leaves {size(near.remainder)} times the noise{held}. "
     )
 
 

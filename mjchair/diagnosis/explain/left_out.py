@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,19 @@ from mjchair.diagnosis.replay.sampling import residual
 
 Array = NDArray[np.float64]
 ALONE = 0.05  # share of a column that the other parts must show, for a part to be held out
+
+
+class Lone(NamedTuple):
+    """A held-out run that disagrees far more than the runs of the fit.
+
+    Attributes:
+      run: its name. left: rms that it leaves, over the noise. others: the most that a run of the
+        fit leaves.
+    """
+
+    run: str
+    left: float
+    others: float
 
 
 def held_out(
@@ -108,6 +122,27 @@ def on_held_out(base: Base, fitted: Fitted) -> rules.HeldOut | None:
     before, dof = _foretold(base, base.plain, held)
     after, changed = _foretold(base, fitted, held)[0], _changed(base, fitted, held)
     return rules.HeldOut(before=before, after=after, dof=dof, changed=changed)
+
+
+def lone_run(base: Base, fitted: Fitted) -> Lone | None:
+    """The held-out run that disagrees far more than every run of the fit; None: there is none."""
+    windows = base.bench.simulator.windows
+    runs = base.bench.simulator.study.runs
+    held, others = [], 0.0
+    for k, run in enumerate(runs):
+        mine = np.array([i for i, w in enumerate(windows) if w.run == k], int)
+        if not mine.size:
+            continue
+        if run.hold_out:
+            held.append((_over_noise(*_foretold(base, fitted, mine)), run.trial.name))
+        else:
+            others = max(others, _over_noise(*slow_part(fitted.system, mine)))
+    most, name = max(held, default=(0.0, ""))
+    return Lone(name, most, others) if rules.shows_alone(held=most, others=others) else None
+
+
+def _over_noise(chi2: float, dof: float) -> float:
+    return float(np.sqrt(max(chi2, 0.0) / max(dof, 1.0)))
 
 
 def _foretold(base: Base, fitted: Fitted, windows: NDArray[np.int64]) -> tuple[float, float]:

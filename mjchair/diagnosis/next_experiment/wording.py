@@ -178,6 +178,20 @@ OTHERWISE = (
 )
 
 
+def letting_in(run: str, left: float, others: float) -> str:
+    """What to do where a held-out run alone shows what is missing.
+
+    Args:
+      run: its name. left: what it leaves, in noises. others: the most that a run of the fit leaves.
+    """
+    return (
+        f"Hold out another run than {run} and diagnose again: at best {run} is left {left:.3g} "
+        f"times the noise off, the runs of the fit at most {others:.3g} times, so that what is "
+        "missing shows in none of them. With a second run of its kind, one of the two can be held "
+        "out."
+    )
+
+
 def searching(drivers: Sequence[tuple[Driver, float]]) -> str:
     """What to do about a force that no effect explains.
 
