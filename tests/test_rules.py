@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from mjchair.diagnosis import rules
+from mjchair.diagnosis.result import Estimate
 from mjchair.diagnosis.rules import HeldOut, Standing, Verdict
-from mjchair.report.diagnosis_words import nothing_missing
+from mjchair.report.diagnosis_words import nothing_missing, turn_words
 
 # an effect that closes all and is sure
 CLEAR = Standing(
@@ -266,6 +267,18 @@ def test_the_words_of_none_that_matters_fit_the_force():
     small, large = (SimpleNamespace(value=v, limit=1.2) for v in (0.4, 3.7))
     assert "below 1.2 N" in nothing_missing(SimpleNamespace(gap=gap, material=small))
     assert "N" not in nothing_missing(SimpleNamespace(gap=gap, material=large)).removeprefix("N")
+
+
+@pytest.mark.parametrize(
+    ("wheel", "drive", "said"),
+    [(3.0, 4.3, "3 N comes once a turn of the rear wheels"), (3.0, 7.0, ""), (1.0, 1.0, "")],
+)
+def test_a_force_once_a_turn_that_counts_as_noise_is_told(wheel, drive, said):
+    sizes = {"drive": drive, "wheel_turn": wheel}
+    process = {name: Estimate(value=v, std=None, unit="N") for name, v in sizes.items()}
+    found = turn_words(SimpleNamespace(process=process, material=SimpleNamespace(limit=1.2)))
+    assert said in found and bool(said) == bool(found)
+    assert not turn_words(SimpleNamespace(process={}, material=None))
 
 
 def test_nothing_is_missing_only_if_the_chair_is_where_the_fit_moved_it():

@@ -25,6 +25,7 @@ from mjchair.diagnosis.rules import LEVEL, PARTLY, Verdict
 LEAST = 1e-6  # a chance below this is said to be below it
 # what a force may go with that is not known where nothing tells how the chair turns
 TURNING = (Quantity.YAW_RATE, Quantity.HEADING, Quantity.SWIVEL, Quantity.RIGHT_TURN)
+TURNS = {"wheel_turn": "once a turn of the rear wheels", "caster_turn": "once a turn of casters"}
 CLEAR = 0.5  # of what shakes the chair forward: a force once a turn of this size is told
 UNSURE = 0.005  # probabilities below this are not named
 
@@ -33,7 +34,7 @@ def missing(diagnosis: Diagnosis) -> str:
     """What is missing, in one sentence."""
     effects = " and ".join(effect_words(e) for e in diagnosis.effects)
     if diagnosis.verdict == Verdict.NONE:
-        return nothing_missing(diagnosis)
+        return nothing_missing(diagnosis) + turn_words(diagnosis)
     if diagnosis.verdict == Verdict.NAMED:
         return remainder_words(diagnosis) + f"The chair lacks {effects}."
     if diagnosis.verdict == Verdict.AMBIGUOUS:
@@ -66,6 +67,17 @@ def nothing_missing(diagnosis: Diagnosis) -> str:
     )
 
 
+def turn_words(diagnosis: Diagnosis) -> str:
+    """What comes once a turn of a wheel and counts as noise; nothing where it is small."""
+    limit = diagnosis.material.limit if diagnosis.material else 0.0
+    return "".join(
+        f" A force of about {size(force.value)} {force.unit} comes {when} and counts as noise: "
+        "a bent rim, a wheel out of round or an encoder's error makes one."
+        for when, force in _clear_turns(diagnosis).values()
+        if force.value > limit
+    )
+
+
 def remainder_words(diagnosis: Diagnosis) -> str:
     """What a name leaves, before the name; nothing where nothing is left."""
     if not diagnosis.more_missing:
@@ -84,12 +96,7 @@ def process_words(diagnosis: Diagnosis) -> str:
     if not process:
         return ""
     names = {"drive": "forward", "side": "sideways", "yaw": "about the vertical"}
-    turns = {
-        "wheel_turn": "once a turn of the rear wheels",
-        "caster_turn": "once a turn of casters",
-    }
-    clear = {n for n in turns if n in process and process[n].value > CLEAR * process["drive"].value}
-    names |= {n: turns[n] for n in clear}
+    names |= {name: when for name, (when, _) in _clear_turns(diagnosis).items()}
     levels = ", ".join(
         f"{size(e.value)} {e.unit} {names[name]}" for name, e in process.items() if name in names
     )
@@ -98,6 +105,16 @@ def process_words(diagnosis: Diagnosis) -> str:
         f"no run (joints of the floor, spokes, breathing): {levels}, as these runs show it. "
         f"{_person_words(diagnosis)}A gap is what stands out of both."
     )
+
+
+def _clear_turns(diagnosis: Diagnosis) -> dict[str, tuple[str, Estimate]]:
+    """When and how large a force once a turn is that stands out of what shakes the chair."""
+    process = diagnosis.process
+    return {
+        name: (when, process[name])
+        for name, when in TURNS.items()
+        if name in process and process[name].value > CLEAR * process["drive"].value
+    }
 
 
 def _person_words(diagnosis: Diagnosis) -> str:
