@@ -26,6 +26,7 @@ from mjchair.diagnosis.explain.left_out import (
     held_windows,
     lone_run,
     on_held_out,
+    over_noise,
     slow_part,
 )
 from mjchair.diagnosis.explain.probability import of_any, of_effects, probabilities, with_gap
@@ -71,7 +72,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     said = rules.verdict(gap.exists, stands)
     forces = missing_forces(base)
     size = material(base, gap, choice)
-    before = _rms(*slow_part(base.plain.system, _shown_windows(base)))
+    before = over_noise(*slow_part(base.plain.system, _shown_windows(base)))
     if not rules.matters(
         force=size.value,
         limit=size.limit,
@@ -122,7 +123,7 @@ def _nearest(base: Base, choice: Choice, closed: float) -> Nearest:
     return Nearest(
         effects=tuple(t.effect.key for t in choice.fitted.variant.terms),
         closure=closed,
-        remainder=_rms(*slow_part(choice.fitted.system, _shown_windows(base))),
+        remainder=over_noise(*slow_part(choice.fitted.system, _shown_windows(base))),
     )
 
 
@@ -301,10 +302,6 @@ def _candidates(base: Base, gap: Gap, choice: Choice | None) -> list[Candidate]:
     return sorted(out, key=lambda c: -c.held_out_gain)
 
 
-def _rms(chi2: float, dof: float) -> float:
-    return float(np.sqrt(max(chi2, 0.0) / max(dof, 1.0)))
-
-
 def _shown_windows(base: Base) -> NDArray[np.int64]:
     """Held-out windows, or all that were fitted to where none is held out."""
     held = held_windows(base)
@@ -317,8 +314,8 @@ def _summary(base: Base, gap: Gap, choice: Choice | None) -> GapSummary:
     before, dof = slow_part(base.plain.system, windows)
     who = "held-out trials" if held.size else "all trials, since none is held out"
     return GapSummary(
-        before=_rms(before, dof),
-        after=_rms(slow_part(choice.fitted.system, windows)[0], dof) if choice else None,
+        before=over_noise(before, dof),
+        after=over_noise(slow_part(choice.fitted.system, windows)[0], dof) if choice else None,
         scope=f"{who}: rms of the whitened residual below {BAND:g} Hz",
         p_value=gap.p,
         p_value_after=choice.after.p if choice else None,

@@ -6,7 +6,7 @@ out, in chi2.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -126,23 +126,17 @@ def on_held_out(base: Base, fitted: Fitted) -> rules.HeldOut | None:
 
 def lone_run(base: Base, fitted: Fitted) -> Lone | None:
     """The held-out run that disagrees far more than every run of the fit; None: there is none."""
-    windows = base.bench.simulator.windows
-    runs = base.bench.simulator.study.runs
     held, others = [], 0.0
-    for k, run in enumerate(runs):
-        mine = np.array([i for i, w in enumerate(windows) if w.run == k], int)
+    for k, run in enumerate(base.bench.simulator.study.runs):
+        mine = _windows_of(base, {k})
         if not mine.size:
             continue
         if run.hold_out:
-            held.append((_over_noise(*_foretold(base, fitted, mine)), run.trial.name))
+            held.append((over_noise(*_foretold(base, fitted, mine)), run.trial.name))
         else:
-            others = max(others, _over_noise(*slow_part(fitted.system, mine)))
+            others = max(others, over_noise(*slow_part(fitted.system, mine)))
     most, name = max(held, default=(0.0, ""))
     return Lone(name, most, others) if rules.shows_alone(held=most, others=others) else None
-
-
-def _over_noise(chi2: float, dof: float) -> float:
-    return float(np.sqrt(max(chi2, 0.0) / max(dof, 1.0)))
 
 
 def _foretold(base: Base, fitted: Fitted, windows: NDArray[np.int64]) -> tuple[float, float]:
@@ -178,10 +172,20 @@ def slow_part(system: System, windows: NDArray[np.int64]) -> tuple[float, float]
     return sum(c.total for c in cells), sum(c.total_dof for c in cells)
 
 
+def over_noise(chi2: float, dof: float) -> float:
+    """Rms over the noise of what has this chi2 and these degrees of freedom."""
+    return float(np.sqrt(max(chi2, 0.0) / max(dof, 1.0)))
+
+
 def held_windows(base: Base) -> NDArray[np.int64]:
     """The windows of the trials that are held out of every fit."""
-    held = {i for i, r in enumerate(base.bench.simulator.study.runs) if r.hold_out}
-    return np.array([i for i, w in enumerate(base.bench.simulator.windows) if w.run in held], int)
+    runs = base.bench.simulator.study.runs
+    return _windows_of(base, {i for i, r in enumerate(runs) if r.hold_out})
+
+
+def _windows_of(base: Base, runs: Collection[int]) -> NDArray[np.int64]:
+    """The windows of some runs."""
+    return np.array([i for i, w in enumerate(base.bench.simulator.windows) if w.run in runs], int)
 
 
 def plain_gap(base: Base) -> Gap:
