@@ -64,7 +64,8 @@ class Rows:
 
     Attributes:
       text: the rows. source: the file, for error lines. delimiter: between the cells. decimal: the
-      mark in a number, "." or ",". before: rows of the file before these.
+      mark in a number, "." or ",". before: rows of the file before these. missing: words that stand
+      for a missing sample as an empty cell does, in lower case.
     """
 
     text: str
@@ -72,6 +73,7 @@ class Rows:
     delimiter: str
     decimal: str
     before: int
+    missing: tuple[str, ...] = ()
 
 
 def numbers(
@@ -145,7 +147,9 @@ def _numbers(column: Any, rows: Rows, name: str) -> Array:
         return f"{rows.source}: row {row + 1 + rows.before}, column {name!r}"
 
     column = pyarrow.compute.utf8_trim_whitespace(column)
-    column = pyarrow.compute.if_else(pyarrow.compute.equal(column, ""), None, column)
+    empty = pyarrow.array(["", *rows.missing])
+    blank = pyarrow.compute.is_in(pyarrow.compute.utf8_lower(column), value_set=empty)
+    column = pyarrow.compute.if_else(blank, None, column)
     if rows.decimal == ",":
         column = pyarrow.compute.replace_substring(column, ",", ".")
     try:

@@ -303,9 +303,28 @@ def test_a_pushed_run_of_a_frame_sensor_alone_is_no_coast(run, tmp_path):
     with pytest.raises(MjchairError, match=r"'day': day_frame.csv shows .* pushes, and no file"):
         gather(tmp_path)
     own, _, gyroscope, level = lab.frame_sensor(lab.motion(12.0, pushed=False))
-    lab.ngimu(tmp_path / "day_frame.csv", own, gyroscope, level)
-    (trial,) = gather(tmp_path).trials
-    assert trial.manoeuvre == "coast"
+    lab.ngimu(tmp_path / "night_frame.csv", own, gyroscope, level)
+    found = gather(tmp_path)
+    (trial,) = found.trials
+    assert trial.name == "night" and trial.manoeuvre == "coast"
+    assert any(n.startswith("left out: trial 'day'") for n in found.notes)
+
+
+def test_the_word_nan_stands_for_a_missing_sample_in_an_export(run, tmp_path):
+    """Programs that write tables put NaN where a sample was lost."""
+    own, _, gyroscope, level = lab.frame_sensor(lab.motion(12.0, pushed=False))
+    path = tmp_path / "day_frame.csv"
+    lab.ngimu(path, own, gyroscope, level)
+    lines = path.read_text().splitlines()
+    cells = lines[50].split(",")
+    empty, nan = ([cells[0], *[word] * (len(cells) - 1)] for word in ("", "NaN"))
+    seen = []
+    for lost in (empty, nan):
+        lines[50] = ",".join(lost)
+        path.write_text("\n".join(lines) + "\n")
+        (trial,) = gather(tmp_path).trials
+        seen.append(trial.columns["imu_accelerometer.x"])
+    np.testing.assert_array_equal(*seen)
 
 
 def test_any_table_comes_in_by_a_mapping_of_ones_own(tmp_path, run):
@@ -427,6 +446,25 @@ def test_force_takes_the_tables_of_an_earlier_gather_away_and_no_other_file(tmp_
     assert main(command) == 0
     left = {path.name for path in out.glob("*.csv")}
     assert left == {"mine.csv", "named.csv", "second.csv"}
+
+
+def test_a_study_inside_the_folder_of_the_files_is_no_raw_file_and_never_takes_its_place(
+    tmp_path, capsys
+):
+    source = tmp_path / "mine"
+    source.mkdir()
+    raw = samples.propulsion().read_bytes()
+    (source / "first.csv").write_bytes(raw)
+    command = ["gather", str(source), "--mass", "92", "--force", "--out"]
+    assert main([*command, str(source)]) == 2
+    assert "is the folder of the files" in capsys.readouterr().err
+    assert (source / "first.csv").read_bytes() == raw
+    out = source / "study"
+    made = []
+    for _ in range(2):
+        assert main([*command, str(out)]) == 0
+        made.append({p.name: p.read_bytes() for p in out.iterdir() if p.suffix != ".png"})
+    assert made[0] == made[1]
 
 
 BAD = {

@@ -228,7 +228,7 @@ def test_licence_and_notice_lie_beside_the_data():
             lambda text: text.replace("\n9,9,", "\nx,9,", 1),
             "row 9, column '1': 'x' is not a number",
         ),
-        (lambda text: text.replace("1,1,", "nan,1,", 1), "row 1, column '1': 'nan'"),
+        (lambda text: text.replace("1,1,", "nan,1,", 1), "row 1 has no finite number in column 1"),
         (lambda text: "\n".join(text.splitlines()[:5]), "5 samples; a speed needs at least"),
         (lambda text: text[: len(text) - 40], "row 240 has .* is the file cut short"),
         (

@@ -62,11 +62,14 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 
 def run(args: argparse.Namespace) -> int:
     """Gather, check that the study can be read, write it whole, and print what was found out."""
-    from mjchair.measurement.gather.gather import LOG, gather
+    from mjchair.measurement.gather.gather import gather
     from mjchair.measurement.gather.known import Known
+    from mjchair.measurement.gather.sources import LOG
     from mjchair.measurement.notes import Detail, once
     from mjchair.storage import check_vacant
 
+    if Path(args.out).resolve() == Path(args.folder).resolve():
+        raise MjchairError(f"--out {args.out} is the folder of the files; give another folder")
     check_vacant(args.out, args.force)
     known = Known(
         args.rider_mass, args.chair_mass, args.mass, args.wheel_radius, args.floor, args.grade
@@ -130,7 +133,7 @@ def _offset(text: str) -> tuple[str, float]:
 
 def _earlier(folder: Path) -> list[Path]:
     """The tables of an earlier gather: those that both its log and its study.toml name."""
-    from mjchair.measurement.gather.gather import LOG
+    from mjchair.measurement.gather.sources import LOG
 
     log, study = folder / LOG, folder / "study.toml"
     if not (log.is_file() and study.is_file()):

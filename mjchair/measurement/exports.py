@@ -168,7 +168,8 @@ def read_export(file: Delimited, form: Format) -> Export:
     """What a file of a format holds.
 
     Raises:
-      MjchairError: a column or a unit that is not there, or a clock that is blank or stands still.
+      MjchairError: a column or a unit that is not there, a clock that is blank or stands still, or
+        a sensor without samples.
     """
     rate, assumed, notes = _rate(file, form)
     time = _time(file, form, rate)
@@ -183,6 +184,8 @@ def read_export(file: Delimited, form: Format) -> Export:
     if kept.size < time.size:
         lost = time.size - kept.size
         notes.append(f"{Path(file.source).name}: {lost} rows repeat a time or have none; left out")
+    kept, said = _seen(file, form, kept)
+    notes += said
     time = time[kept] - time[kept[0]]
     columns = {name: _one(file, entry, form)[kept] for name, entry in form.mapping.columns.items()}
     return Export(
@@ -196,6 +199,32 @@ def read_export(file: Delimited, form: Format) -> Export:
         notes=tuple(notes),
         assumed=assumed,
     )
+
+
+def _seen(
+    file: Delimited, form: Format, rows: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], list[str]]:
+    """Of some rows, those in which the sensors have every sample, and a note on the others.
+
+    Where a packet of a wireless sensor was lost, its row is empty.
+
+    Raises:
+      MjchairError: fewer than two such rows.
+    """
+    vectors = [v for v in (form.mapping.gyroscope, form.mapping.accelerometer) if v is not None]
+    names = [name for vector in vectors for name in vector.columns]
+    there = np.ones(rows.size, bool)
+    for name in names:
+        there &= np.isfinite(_column(file, name)[rows])
+    if there.sum() < 2:
+        raise MjchairError(
+            f"{file.source}: no two rows have a number in each of {', '.join(map(repr, names))}"
+        )
+    if there.all():
+        return rows, []
+    lost = rows.size - int(there.sum())
+    said = f"{Path(file.source).name}: {lost} of {rows.size} rows lack a sample; left out"
+    return rows[there], [said]
 
 
 def _rate(file: Delimited, form: Format) -> tuple[float, float | None, list[str]]:

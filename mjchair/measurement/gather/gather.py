@@ -22,14 +22,13 @@ from mjchair.measurement.gather.instruments import (
 )
 from mjchair.measurement.gather.join import GatheredTrial, heading_at, join
 from mjchair.measurement.gather.known import Known
-from mjchair.measurement.gather.sources import Source, find_sources
+from mjchair.measurement.gather.sources import LOG, Source, find_sources
 from mjchair.measurement.gather.study_file import study_text
 from mjchair.measurement.gather.together import Agreed, label_of, started_together
 from mjchair.measurement.gather.without_torque import estimated
 
 Array = NDArray[np.float64]
 
-LOG = "gather.log"
 QUIET = 0.5  # s at rest, the least from which noise is read
 RESTS = 0.05  # rad/s of a wheel, below which the chair stands
 STEP = 2.0 * np.pi / 4096  # rad, of the encoders in use
@@ -89,16 +88,23 @@ def gather(
     joined = [join(name, mine[name]) for name in names]
     agreed, shared = started_together(joined)
     trials: list[GatheredTrial] = []
+    left_out: list[str] = []
     for name, trial in zip(names, joined, strict=True):
         same = join(name, mine[name], agreed[name]) if name in agreed else trial
-        trials += _usable(_for_floor(same, known), known)
+        same = _for_floor(same, known)
+        why = _pushed_unseen(same)
+        if why:
+            left_out.append(why)
+        else:
+            trials += _usable(same, known)
     if not trials:
-        raise MjchairError(f"{folder}: no trial with a motion that a study can use")
+        raise MjchairError("; ".join(left_out))
     _ask_sides(trials)
     if known.floor not in RUNS_OFF_FLOOR:
         trials = _headed(trials)
     noise = _noise(trials)
     notes = [*dict.fromkeys(note for trial in trials for note in trial.notes)]
+    notes += [f"left out: {why}" for why in left_out]
     notes += [
         f"{s.path.name}: on the person's body; not used here" for s in sources if s.place == "body"
     ]
@@ -175,7 +181,6 @@ def _usable(trial: GatheredTrial, known: Known) -> list[GatheredTrial]:
         return [trial]
     motion = next((one for one in trial.instruments if one.speed is not None), None)
     if motion is None or motion.speed is None:
-        _check_unpushed(trial)
         said = f"{trial.name}: no wheel's motion; it is taken as a coast throughout"
         return [replace(trial, notes=(*trial.notes, said))]
     parts = coasts(motion.time, motion.speed)
@@ -195,19 +200,20 @@ def _usable(trial: GatheredTrial, known: Known) -> list[GatheredTrial]:
     ]
 
 
-def _check_unpushed(trial: GatheredTrial) -> None:
-    """Refuse a run that is pushed, of which nothing tells how a wheel turns or is driven."""
+def _pushed_unseen(trial: GatheredTrial) -> str:
+    """Why a trial cannot be used that is pushed, where no wheel is seen and no torque; or ""."""
     pull = trial.columns.get("imu_accelerometer.x")
-    if pull is None:
-        return
+    if trial.driven or pull is None or any(one.speed is not None for one in trial.instruments):
+        return ""
     seen = np.isfinite(pull)
     count = pushes(trial.time[seen], pull[seen])
-    if count >= MANY:
-        names = ", ".join(one.name for one in trial.instruments)
-        raise MjchairError(
-            f"trial {trial.name!r}: {names} shows {count} pushes, and no file tells how a wheel "
-            "turns or what drives it; add a wheel's file, or cut this one to where it rolls freely"
-        )
+    if count < MANY:
+        return ""
+    names = ", ".join(one.name for one in trial.instruments)
+    return (
+        f"trial {trial.name!r}: {names} shows {count} pushes, and no file tells how a wheel turns "
+        "or what drives it; add a wheel's file, or cut this one to where it rolls freely"
+    )
 
 
 def _cut(trial: GatheredTrial, name: str, span: tuple[float, float], said: str) -> GatheredTrial:

@@ -31,6 +31,7 @@ from mjchair.measurement.exports import Format, matching, read_formats
 from mjchair.toml_file import read_toml
 
 PLAN = "gather.toml"
+LOG = "gather.log"  # stands in every study that was gathered
 DEEPEST = 4  # folders below the one that is given
 SUFFIXES = (".csv", ".txt", ".tsv", ".c3d", ".trc", ".parquet")
 GENERIC = {"sensors", "inertial", "imu", "calinertialandmag", "data", "export", "stats"}
@@ -119,6 +120,8 @@ def find_sources(folder: Path, mappings: Sequence[Path] = ()) -> Found:
         if not path.is_file() or path.name == PLAN or len(inside.parts) > DEEPEST:
             continue
         if path.suffix.lower() not in SUFFIXES or path.name.startswith("."):
+            continue
+        if (path.parent / LOG).is_file():  # a study that was gathered before, no raw files
             continue
         if path.stem.lower() in PAPERS:
             continue
