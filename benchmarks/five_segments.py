@@ -14,7 +14,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +35,7 @@ SEGMENTS = {
     "forearms": (0.032, 0.430, 0.303, 0.146),
     "hands": (0.012, 0.506, 0.297, 0.050),
 }
+LOADED = (0.12, 0.55)  # m, where a load is strapped on: forward of the axle, above the ground
 HIP = (0.08, 0.50)  # m, of the hip joint: forward of the rear axle, above the ground; assumption
 
 
@@ -66,6 +67,7 @@ class Chair:
     rolling_rear: float = 0.010
     rolling_caster: float = 0.015
     rim_radius: float = 0.27
+    load: float = 0.0  # kg, strapped on at LOADED
 
 
 @dataclass(frozen=True)
@@ -227,6 +229,10 @@ def roll(
     spin = np.array([chair.rear_inertia, chair.caster_inertia])
     radius = np.array([chair.rear_radius, chair.caster_radius])
     turning = float((2.0 * spin / radius**2).sum())
+    # what is strapped on comes on top of that
+    front = (front * rest + LOADED[0] * chair.load) / (rest + chair.load)
+    height = (height * rest + LOADED[1] * chair.load) / (rest + chair.load)
+    whole, rest = whole + chair.load, rest + chair.load
     load = whole * GRAVITY + away[:, :, 1] @ segments.mass
     # load of the casters from moments about the contact of the rear wheels: `lean` without the
     # chair's own acceleration, and `high` less for every m/s^2 of it; angles turn z into x
@@ -277,13 +283,18 @@ NOISE = {
 
 @dataclass(frozen=True)
 class Case:
-    """A study: what is hidden in it, its person, and whether the motion was measured."""
+    """A study: what is hidden in it, its person, whether the motion was measured, and a load."""
 
     hidden: Hidden
     person: Person = field(default_factory=Person)
     measured: bool = True
     coasts: int = 4
     pushes: int = 4
+    load: float = 0.0  # kg, on the chair in the coasts 3 and 4
+
+    def loaded(self, name: str) -> float:
+        """The load (kg) of a trial."""
+        return self.load if name in ("coast_3", "coast_4") else 0.0
 
 
 def tables(case: Case, seed: int = 0) -> tuple[dict[str, dict[str, Array]], Mapping[str, float]]:
@@ -303,7 +314,9 @@ def tables(case: Case, seed: int = 0) -> tuple[dict[str, dict[str, Array]], Mapp
         fine = FINE * np.arange(round(duration / FINE) + 1)
         torque = rims(person, begins, strength, fine)
         start = Start(1.4 if coast else 0.9, math.cos(heads[name]))
-        run = roll(person, chair, case.hidden, segments, torque, start)
+        run = roll(
+            person, replace(chair, load=case.loaded(name)), case.hidden, segments, torque, start
+        )
         out[name] = _sensed(
             case, run, segments, None if coast else (fine, torque), heads[name], rng
         )
@@ -353,6 +366,9 @@ def write(case: Case, folder: Path, seed: int = 0) -> None:
             "[trial.initial]",
             f"heading = {heads[name]:.6f}",
         ]
+        if case.loaded(name):
+            text += ["[trial.load]", f"mass = {case.load}"]
+            text += [f"forward = {LOADED[0]}", f"height = {LOADED[1]}"]
     (folder / "study.toml").write_text("\n".join(text) + "\n", encoding="utf-8")
 
 
@@ -362,6 +378,7 @@ CASES = {
     "slope": Case(Hidden(rolling=0.005, slope=0.006)),
     "gain": Case(Hidden(rolling=0.005, gain_left=0.10, gain_right=0.10)),
     "gains": Case(Hidden(rolling=0.005, gain_left=0.05, gain_right=-0.03)),
+    "loaded": Case(Hidden(rolling=0.005, gain_left=0.05, gain_right=-0.03), load=40.0),
     "strokes": Case(Hidden(), measured=False),
     "strokes_rolling": Case(Hidden(rolling=0.006), measured=False),
     "still": Case(Hidden(moves=False), measured=False),

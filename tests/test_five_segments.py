@@ -6,7 +6,18 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from five_segments import Case, Chair, Hidden, Person, body, centre_of_mass, strokes, tables
+from five_segments import (
+    Case,
+    Chair,
+    Hidden,
+    Person,
+    Start,
+    body,
+    centre_of_mass,
+    roll,
+    strokes,
+    tables,
+)
 
 import mjchair
 from mjchair.effects import rider_motion
@@ -60,6 +71,30 @@ def test_a_rigid_person_rolls_alike_in_both(pushed):
             )
             speed = np.interp(columns["time"], run.time, run["left_wheel_speed"]) * 0.3
             assert np.std(speed - 0.3 * columns["left_wheel_speed"]) < 0.012
+
+
+def test_a_load_takes_part_in_what_drives_and_in_what_rolls():
+    """A push of 1 N m on each rim gains F t / m; a load adds its rolling resistance and no more."""
+    person, fine = Person(), np.full(801, 1.0)
+    still = body(person, Chair(), 2.0, np.zeros(0), np.zeros(0))
+
+    def gained(rolling, load):
+        chair = Chair(rolling_rear=rolling, rolling_caster=rolling, load=load)
+        run = roll(person, chair, Hidden(moves=False), still, fine, Start(1.0, 1.0))
+        return run.gained[-1]
+
+    spin = sum(
+        2.0 * inertia / radius**2
+        for inertia, radius in (
+            (Chair().rear_inertia, Chair().rear_radius),
+            (Chair().caster_inertia, Chair().caster_radius),
+        )
+    )
+    for load in (0.0, 40.0):
+        whole = person.mass + Chair().mass + load
+        force = 2.0 / Chair().rear_radius
+        assert gained(0.0, load) * (whole + spin) == pytest.approx(force)
+        assert gained(0.01, load) * (whole + spin) == pytest.approx(force - 0.01 * 9.81 * whole)
 
 
 def test_speed_within_a_stroke_is_the_moving_riders_and_not_the_rigid_ones(pushed):
