@@ -215,5 +215,6 @@ def test_a_better_place_beside_which_no_chair_can_be_is_a_step_that_failed(monke
     ],
 )
 def test_a_size_ends_on_a_bound_or_beside_it(effect, value, on):
-    (p,) = library.find(effect).parameters
-    assert nonlinear._on_bound(p, value) == on
+    effect = library.find(effect)
+    (p,) = effect.parameters
+    assert bool(nonlinear.on_bound(Term(effect, {p.name: value}, (p.name,)))) == on

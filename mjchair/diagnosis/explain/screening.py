@@ -23,7 +23,7 @@ from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.fit.column_ids import ColumnId
-from mjchair.diagnosis.fit.nonlinear import Fitted, refit
+from mjchair.diagnosis.fit.nonlinear import Fitted, on_bound, refit
 from mjchair.diagnosis.fit.parameter_columns import nuisance_columns
 from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.fit.variant import Variant
@@ -196,12 +196,39 @@ def _first_that_holds(
 
     It holds where it brings about what linear algebra promises of it, and pushes nothing to where
     it cannot be. Effects that are nearly alike may come out large and opposed to one another by
-    linear algebra, and where one effect of several is missing, others go to their ends for it.
+    linear algebra, and where one effect of several is missing, others go to their ends for it. So
+    what linear algebra puts on a bound waits, and is fitted only where it promises less than what
+    holds without it leaves.
     """
-    made = []
-    for h in options[:TRIED]:
-        if h.gain <= rules.needed(h.free):
-            continue
+    worth = [h for h in options[:TRIED] if h.gain > rules.needed(h.free)]
+    far = {h.name for h in worth if any(map(on_bound, hypotheses.terms(reduced, h)))}
+    made: list[tuple[float, Found]] = []
+    inside = _holding(base, bench, reduced, [h for h in worth if h.name not in far], made)
+    outside = [h for h in worth if h.name in far and _promises_more(reduced, h, inside)]
+    holds = _holding(base, bench, reduced, outside, made) or inside
+    if holds is not None or not made:
+        return holds
+    return min(made, key=lambda m: m[0])[1]
+
+
+def _promises_more(reduced: Reduced, h: Hypothesis, found: Found | None) -> bool:
+    """Whether a hypothesis promises to leave clearly less than what was found leaves."""
+    return found is None or reduced.total - h.gain + rules.needed(h.free) < found.fitted.total
+
+
+def _holding(
+    base: Base,
+    bench: Bench,
+    reduced: Reduced,
+    options: Sequence[Hypothesis],
+    made: list[tuple[float, Found]],
+) -> Found | None:
+    """The fit of the first hypothesis that holds; None: none does.
+
+    Args:
+      made: takes what each other fit leaves, with its penalty, and the fit.
+    """
+    for h in options:
         start = replace(base.around.variant, terms=hypotheses.terms(reduced, h))
         try:
             fitted = refit(bench, start, base.around.track, base.nuisances, ROUNDS)
@@ -214,7 +241,7 @@ def _first_that_holds(
         if settled and not short and not pushed:
             return found
         made.append((fitted.total + h.penalty, found))
-    return min(made, key=lambda m: m[0])[1] if made else None
+    return None
 
 
 def _reduced_anew(base: Base) -> Base:

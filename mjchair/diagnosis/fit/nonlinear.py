@@ -27,7 +27,7 @@ from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.window_states import Track, track
-from mjchair.effects.effect import Parameter, clip
+from mjchair.effects.effect import clip
 from mjchair.errors import MjchairError
 
 Array = NDArray[np.float64]
@@ -227,13 +227,11 @@ def _around(
     step, _ = bounded.solve_nuisances(system, bench.windows, outside)
     system.set_cells(step[:count])  # of this very variant: nothing else of it is moved
     covariance = bounded.covariance(system, bench.windows)
-    std, bound = {}, []
+    std = {}
     for term in variant.terms:
         for key, p in term.parameters:
             k = system.places[key]
             std[key] = float(np.sqrt(max(covariance[k, k], 0.0))) * p.change
-            if _on_bound(p, term.values[p.name]):
-                bound.append(key)
     terms = range(count, len(system.columns))
     return Fitted(
         variant=variant,
@@ -246,7 +244,7 @@ def _around(
         promised=bounded.solve(system, bench.windows, terms)[1],
         std=std,
         sigmas={t.effect.key: _sigmas(t, system, covariance) for t in variant.terms},
-        at_bound=tuple(bound),
+        at_bound=tuple(key for term in variant.terms for key in on_bound(term)),
     )
 
 
@@ -263,12 +261,15 @@ def _outside(bench: Bench, nuisances: Iterable[ColumnId]) -> list[ColumnId]:
     return [column for column in nuisances if column not in inside]
 
 
-def _on_bound(p: Parameter, value: float) -> bool:
-    """Whether the size of an effect ended on a bound that is not where the effect is not there."""
-    near = ON_BOUND * (p.high - p.low)
-    return p.sized and any(
-        abs(value - bound) <= near and bound != p.neutral for bound in (p.low, p.high)
-    )
+def on_bound(term: Term) -> list[ParameterId]:
+    """The sizes of an effect that lie on a bound which is not where the effect is not there."""
+    out = []
+    for key, p in term.parameters:
+        value, near = term.values[p.name], ON_BOUND * (p.high - p.low)
+        ends = [bound for bound in (p.low, p.high) if bound != p.neutral]
+        if p.sized and any(abs(value - bound) <= near for bound in ends):
+            out.append(key)
+    return out
 
 
 def _shorter(best: Fitted, total: float, share: float) -> float:
