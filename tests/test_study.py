@@ -88,6 +88,15 @@ def test_a_dead_channel_is_left_out_and_said(tmp_path):
     assert any("imu_gyro.z is exactly zero" in note for note in study.notes)
 
 
+def test_an_angle_that_starts_again_once_a_turn_is_counted_on_and_said(tmp_path):
+    turned = 3.0 * TIME - 0.15 * TIME**2
+    columns = {f"{side}_wheel_angle": turned % (2.0 * np.pi) for side in ("left", "right")}
+    study = mjchair.read_study(write(tmp_path, columns))
+    for values in study.runs[0].trial.channels.values():
+        np.testing.assert_allclose(values, turned, atol=1e-12)
+    assert sum("wraps once a turn; it is counted on" in note for note in study.notes) == 2
+
+
 def test_a_dead_channel_of_a_standing_chair_stays(tmp_path):
     still = {"left_wheel_speed": np.zeros(TIME.size), "imu_gyro.z": 0.01 * np.sin(40.0 * TIME)}
     study = mjchair.read_study(write(tmp_path, still, EAST))

@@ -51,16 +51,28 @@ def put_right(
       time: (n,), s. columns: study column -> (n,), SI, NaN where a sample is missing. name: of the
         file. turn: whether signs may be turned; False: what is doubtful is only said.
     """
-    out, notes = dict(columns), []
-    for column in (f"{side}_wheel_angle" for side in SIDES):
-        if column in out and wraps(time, out[column]):
-            out[column] = _counted_on(time, out[column])
-            notes.append(f"{name}: {column} wraps once a turn; it is counted on")
+    out, notes = unwrapped(time, columns, name)
     for side, travel, moment in _signs(time, out, name, turn, notes):
         for column, sign in (("angle", travel), ("speed", travel), ("", moment)):
             whole = f"{side}_wheel_{column}".rstrip("_")
             if whole in out:
                 out[whole] = sign * out[whole]
+    return out, notes
+
+
+def unwrapped(
+    time: Array, columns: Mapping[str, Array], name: str
+) -> tuple[dict[str, Array], list[str]]:
+    """The columns with angles of wheels that go on, and a line for each that wrapped.
+
+    Args:
+      time, columns, name: see `put_right`.
+    """
+    out, notes = dict(columns), []
+    for column in (f"{side}_wheel_angle" for side in SIDES):
+        if column in out and wraps(time, out[column]):
+            out[column] = _counted_on(time, out[column])
+            notes.append(f"{name}: {column} wraps once a turn; it is counted on")
     return out, notes
 
 

@@ -187,7 +187,13 @@ def _coming_to_rest(runs: list[Run]) -> list[str]:
 def _checked(trial: Trial, axle: RearAxle) -> tuple[Trial, list[str]]:
     """The trial as it is used, and what was noticed."""
     said = []
-    for stage in (trial_checks.measured_part, trial_checks.without_dead, trial_checks.other_side):
+    stages = (
+        trial_checks.measured_part,
+        trial_checks.without_dead,
+        trial_checks.with_angles_counted_on,
+        trial_checks.other_side,
+    )
+    for stage in stages:
         trial, noticed = stage(trial)
         said += noticed
     trial_checks.check(trial)

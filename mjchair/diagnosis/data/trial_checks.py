@@ -13,6 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from mjchair.errors import MjchairError
+from mjchair.measurement import table_wheels
 from mjchair.measurement.trial import Trial
 from mjchair.model.wheels import base_name
 from mjchair.rider.anatomy import JOINT_NAMES
@@ -164,6 +165,12 @@ def without_dead(trial: Trial) -> tuple[Trial, list[str]]:
     left = {n: v for n, v in trial.channels.items() if n not in dead}
     said = [f"{trial.name}: {n} is exactly zero throughout; it is left out" for n in dead]
     return replace(trial, channels=MappingProxyType(left)), said
+
+
+def with_angles_counted_on(trial: Trial) -> tuple[Trial, list[str]]:
+    """The run with wheels' angles that do not start again once a turn, and a note on each."""
+    channels, said = table_wheels.unwrapped(trial.time, trial.channels, trial.name)
+    return (replace(trial, channels=MappingProxyType(channels)), said) if said else (trial, [])
 
 
 def tells_turning(channels: Iterable[str]) -> bool:
