@@ -290,6 +290,14 @@ def test_the_tag_of_a_sensor_is_no_part_of_the_trials_name(tag, tmp_path):
     assert found == dict(zip(names, ["push1", "push2", "push1"], strict=True))
 
 
+def test_a_file_too_short_for_its_clock_to_be_told_is_named(run, tmp_path):
+    lab.smartwheel(tmp_path / "day_left.csv", run, "left")
+    own, _, gyroscope, level = lab.frame_sensor(run)
+    lab.ngimu(tmp_path / "day_frame.csv", own[:100], gyroscope[:100], level[:100])
+    with pytest.raises(MjchairError, match=r"^day_frame.csv: clocks need 3 s of common motion"):
+        gather(tmp_path)
+
+
 def test_a_tag_that_alone_tells_recordings_apart_is_kept(tmp_path):
     """Also a date of eight digits is no tag."""
     names = ["MT_0120034-001.csv", "day_MT_0120034-001.csv", "day_MT_0120034-002.csv"]

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import mujoco
 
 from mjchair.diagnosis.data import standstill, trial_checks, unit_checks
+from mjchair.diagnosis.data.spikes import without_spikes
 from mjchair.errors import MjchairError
 from mjchair.measurement.trial import Trial, check_columns
 from mjchair.model.load import Load
@@ -186,7 +187,7 @@ def _coming_to_rest(runs: list[Run]) -> list[str]:
 
 def _checked(trial: Trial, axle: RearAxle) -> tuple[Trial, list[str]]:
     """The trial as it is used, and what was noticed."""
-    said = []
+    trial, said = without_spikes(trial, axle)
     stages = (
         trial_checks.measured_part,
         trial_checks.without_dead,

@@ -77,7 +77,7 @@ def _size(values: Array) -> float:
     return float(np.nanpercentile(np.abs(values), 95.0))
 
 
-def _limit(name: str, limit: float, axle: RearAxle) -> float:
+def limit_of(name: str, limit: float, axle: RearAxle) -> float:
     """A limit of a channel; a wheel's, which is of the way that it rolls, in radians."""
     return limit / axle.radius(name.split("_")[0]) if rolls(name) else limit
 
@@ -87,7 +87,7 @@ def _check_limits(trial: Trial, axle: RearAxle) -> None:
         kind = sensor(name)
         if kind.most is None:
             continue
-        limit, size = _limit(name, kind.most, axle), _size(values)
+        limit, size = limit_of(name, kind.most, axle), _size(values)
         if size > limit:
             what = "degrees" if kind.degrees and size <= DEGREES * limit else "other units"
             why = f"it reaches {size:.3g}, and no chair passes {limit:.3g} in SI"
@@ -99,7 +99,7 @@ def _check_rates(trial: Trial, axle: RearAxle) -> None:
         kind = sensor(name)
         if kind.fastest is None:
             continue
-        limit, story = _limit(name, kind.fastest, axle), _rate(trial, name)
+        limit, story = limit_of(name, kind.fastest, axle), _rate(trial, name)
         fastest = _size(story.values) if story.values.size else 0.0
         if fastest > limit:
             why = f"it turns by {fastest:.3g} a second, and no chair passes {limit:.3g} rad/s"

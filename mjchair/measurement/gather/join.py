@@ -126,7 +126,8 @@ def _align(ours: Sequence[Instrument], other: Instrument) -> Alignment:
     try:
         found = _by_motion(ours, other)
     except MjchairError as error:
-        raise MjchairError(f"{error}{_assumed(reference, other)}") from None
+        which = "" if other.name in str(error) else f"{other.name}: "
+        raise MjchairError(f"{which}{error}{_assumed(reference, other)}") from None
     if found.drift != 0.0:
         return found
     return _by_course(reference, other, found) or found

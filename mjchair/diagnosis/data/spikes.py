@@ -1,0 +1,94 @@
+"""Samples that stand alone where no chair can be, as a lost bit or a broken line leaves them.
+
+In: a trial, and the rear axle of the chair. Out: the trial without them, and a note on each channel.
+A sample is such where it passes what a wheelchair shows at all, or where it is far from its
+neighbours on both sides and they are not. Of an accelerometer a shock of one sample is real, so
+there the first alone counts; where many samples are so, the unit is wrong and not the sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from mjchair.diagnosis.data.unit_checks import TORQUE, limit_of
+from mjchair.measurement.sensors import sensor
+from mjchair.measurement.trial import Trial
+from mjchair.model.rolling import RearAxle
+
+Array = NDArray[np.float64]
+
+AROUND = 7  # samples, whose median a sample is compared with; a spike is of 3 at most
+RARE = 0.01  # of the samples, that may be spikes (assumption)
+SCATTER = 90.0  # percentile of the distance from that median: what is usual
+FAR = 30.0  # times the usual, beyond which a sample is alone (assumption)
+STEP = 0.1  # of what a chair shows at most, by which a rate does not change and come back
+SHOCKS = "m/s^2"  # unit of what may be far off for one sample
+
+
+def without_spikes(trial: Trial, axle: RearAxle) -> tuple[Trial, list[str]]:
+    """The run without samples that no chair can show, and a note on each channel that had some.
+
+    Args:
+      axle: of the chair, for the limits of its wheels.
+    """
+    channels, said = _cleaned(trial.time, trial.channels, trial.name, axle)
+    out = replace(trial, channels=channels) if said else trial
+    if trial.inputs is None:
+        return out, said
+    controls, more = _cleaned(trial.inputs.time, trial.inputs.controls, trial.name, None)
+    if more:
+        out = replace(out, inputs=replace(trial.inputs, controls=controls))
+    return out, said + more
+
+
+def _cleaned(
+    time: Array, columns: Mapping[str, Array], run: str, axle: RearAxle | None
+) -> tuple[Mapping[str, Array], list[str]]:
+    """Columns with NaN in place of spikes, and a note on each; no axle: they are torques."""
+    out, said = dict(columns), []
+    for name, values in columns.items():
+        there = np.flatnonzero(np.isfinite(values))
+        alone = _torques(values[there]) if axle is None else _spikes(name, time, values, axle)
+        if not alone.size or alone.size > max(1.0, RARE * there.size):
+            continue
+        at = there[alone]
+        out[name] = values.copy()
+        out[name][at] = np.nan
+        worst = at[int(np.argmax(np.abs(values[at])))]
+        count = "a sample" if at.size == 1 else f"{at.size} samples"
+        said.append(
+            f"{run}: {count} of {name} left out that no chair can show, as {values[worst]:.4g} "
+            f"at {time[worst]:.2f} s"
+        )
+    return MappingProxyType(out), said
+
+
+def _torques(values: Array) -> NDArray[np.int64]:
+    return np.flatnonzero(np.abs(values) > TORQUE)
+
+
+def _spikes(name: str, time: Array, values: Array, axle: RearAxle) -> NDArray[np.int64]:
+    """Which samples of a channel, of those that are there, are spikes."""
+    there, kind = np.isfinite(values), sensor(name)
+    seen = values[there]
+    if seen.size < AROUND or (kind.most is None and kind.fastest is None):
+        return np.zeros(0, np.int64)
+    beyond = np.zeros(seen.size, bool)
+    if kind.most is not None:
+        most = limit_of(name, kind.most, axle)
+        beyond, step = np.abs(seen) > most, STEP * most
+    else:
+        assert kind.fastest is not None
+        fastest = limit_of(name, kind.fastest, axle)
+        step = (AROUND // 2) * fastest * float(np.median(np.diff(time[there])))
+    if kind.unit == SHOCKS:
+        return np.flatnonzero(beyond)
+    course = np.unwrap(seen) if kind.wraps else seen
+    away = np.abs(course - median_filter(course, AROUND, mode="nearest"))
+    return np.flatnonzero(beyond | (away > max(FAR * np.percentile(away, SCATTER), step)))
