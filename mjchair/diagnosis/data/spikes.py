@@ -1,8 +1,8 @@
 """Samples that stand alone where no chair can be, as a lost bit or a broken line leaves them.
 
-In: a trial, and the rear axle of the chair. Out: the trial without them, and a note on each channel.
-A sample is such where it passes what a wheelchair shows at all, or where it is far from its
-neighbours on both sides and they are not. Of an accelerometer a shock of one sample is real, so
+In: a trial, and the rear axle of the chair. Out: the trial without them, and a note on each
+channel. A sample is such where it passes what a wheelchair shows at all, or where it is far from
+its neighbours on both sides and they are not. Of an accelerometer a shock of one sample is real, so
 there the first alone counts; where many samples are so, the unit is wrong and not the sample.
 """
 
