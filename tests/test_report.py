@@ -193,6 +193,25 @@ def test_rivals_are_in_the_first_sentence():
     assert "**floor slope** or **rolling resistance**" in said
 
 
+def test_what_is_in_every_explanation_is_said_before_what_is_open():
+    rivals = ["rolling_resistance", "toe"]
+    found = Diagnosis(
+        verdict=Verdict.AMBIGUOUS,
+        effects=[ROLLING, BIAS],
+        alternatives=[rivals],
+        probability={f"{name}+{BIAS.key}": 0.48 for name in rivals} | {"outside": 0.04},
+    )
+    assert words.certain(found) == [BIAS]
+    said = words.missing(found)
+    assert said.startswith("The chair lacks **sensor bias** on imu_gyro.z")
+    assert "and besides **rolling resistance** or **toe**, which these runs cannot" in said
+    assert said.endswith(
+        "the corrected chair has **rolling resistance** (coefficient 0.01460 ± 0.00040)."
+    )
+    doubted = dataclasses.replace(found, probability={"outside": 0.5, f"toe+{BIAS.key}": 0.5})
+    assert words.certain(doubted) == []
+
+
 @pytest.mark.parametrize("verdict", [Verdict.NONE, Verdict.UNKNOWN])
 def test_no_name_where_none_is_named(verdict):
     assert "resistance" not in words.missing(Diagnosis(verdict=verdict))

@@ -20,7 +20,7 @@ from mjchair.diagnosis.result import (
     MissingForce,
     NamedEffect,
 )
-from mjchair.diagnosis.rules import LEVEL, PARTLY, Verdict
+from mjchair.diagnosis.rules import LEVEL, PARTLY, PROBABLE, Verdict
 
 LEAST = 1e-6  # a chance below this is said to be below it
 # what a force may go with that is not known where nothing tells how the chair turns
@@ -38,15 +38,35 @@ def missing(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == Verdict.NAMED:
         return remainder_words(diagnosis) + f"The chair lacks {effects}."
     if diagnosis.verdict == Verdict.AMBIGUOUS:
-        sets = "; and ".join(" or ".join(bold(n) for n in s) for s in diagnosis.alternatives)
-        doubt = (
-            f"{sets}, which these runs cannot tell apart"
-            if sets
-            else "an effect for which the evidence is thin"
-        )
-        lacks = f"The chair lacks {doubt}; the corrected chair has {effects}."
-        return remainder_words(diagnosis) + lacks
+        return remainder_words(diagnosis) + _undecided(diagnosis)
     return "A force is missing that no effect of the library explains, so none is named."
+
+
+def _undecided(diagnosis: Diagnosis) -> str:
+    """What is missing whichever it is, and what these runs cannot tell apart."""
+    sets = "; and ".join(" or ".join(bold(n) for n in s) for s in diagnosis.alternatives)
+    doubt = (
+        f"{sets}, which these runs cannot tell apart"
+        if sets
+        else "an effect for which the evidence is thin"
+    )
+    known = certain(diagnosis)
+    others = [e for e in diagnosis.effects if e not in known]
+    chosen = " and ".join(map(effect_words, others))
+    if not known or not others:
+        return f"The chair lacks {doubt}; the corrected chair has {chosen}."
+    first = " and ".join(map(effect_words, known))
+    return f"The chair lacks {first}, and besides {doubt}; the corrected chair has {chosen}."
+
+
+def certain(diagnosis: Diagnosis) -> list[NamedEffect]:
+    """Effects that are in nearly every explanation, and for which no other can stand."""
+    open_ones = {name for names in diagnosis.alternatives for name in names}
+    holding = {
+        e.key: sum(p for name, p in diagnosis.probability.items() if e.key in name.split("+"))
+        for e in diagnosis.effects
+    }
+    return [e for e in diagnosis.effects if e.key not in open_ones and holding[e.key] >= PROBABLE]
 
 
 def nothing_missing(diagnosis: Diagnosis) -> str:
