@@ -20,6 +20,7 @@ from mjchair.tire import block
 TIME = np.arange(0.0, 3.0, 0.02)
 
 
+SIDES = ("left", "right")
 EAST = "[trial.initial]\nheading = 0.0\n"
 
 
@@ -59,6 +60,68 @@ def test_missing_things_are_named(tmp_path):
 
 def test_degrees_are_recognised(tmp_path):
     fails(write(tmp_path, wheels(57.3)), "left_wheel_speed looks like degrees")
+
+
+def on_a_bend(**changed):
+    """Wheels, gyroscope, heading and places of a chair that turns to the left as it rolls."""
+    forward, turn = 1.0 + 0.1 * np.sin(TIME), 1.0 + 0.3 * np.sin(2.0 * TIME)
+    heading = np.cumsum(turn) * 0.02
+    columns = {
+        "left_wheel_speed": (forward - 0.28 * turn) / 0.3,
+        "right_wheel_speed": (forward + 0.28 * turn) / 0.3,
+        "imu_gyro.z": turn,
+        "heading": heading,
+        "position.x": np.cumsum(forward * np.cos(heading)) * 0.02,
+        "position.y": np.cumsum(forward * np.sin(heading)) * 0.02,
+    }
+    return columns | {name: change(columns) for name, change in changed.items()}
+
+
+def test_a_bend_in_si_with_the_right_signs_is_read(tmp_path):
+    assert mjchair.read_study(write(tmp_path, on_a_bend())).notes == ()
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        (
+            {
+                "left_wheel_speed": lambda c: c["right_wheel_speed"],
+                "right_wheel_speed": lambda c: c["left_wheel_speed"],
+            },
+            "turns left where the wheels turn right: the columns of the two wheels are swapped",
+        ),
+        ({"imu_gyro.z": lambda c: -c["imu_gyro.z"]}, "imu_gyro.z and heading turn opposite ways"),
+        ({"left_wheel_speed": lambda c: -3.3 + 0.0 * TIME}, "does one of them count down"),
+        (
+            {f"{s}_wheel_speed": lambda c, s=s: 0.3 * c[f"{s}_wheel_speed"] for s in SIDES},
+            "left_wheel_speed looks like m/s.* divide it by the wheel's radius, 0.3",
+        ),
+        *(
+            (
+                {f"position.{a}": lambda c, a=a, u=u: u * c[f"position.{a}"] for a in "xy"},
+                f"position.x looks like {unit}",
+            )
+            for unit, u in (("mm", 1000.0), ("cm", 100.0))
+        ),
+    ],
+)
+def test_channels_that_contradict_each_other_are_named(changed, words, tmp_path):
+    columns = on_a_bend(**changed)
+    if "count down" in words:
+        columns |= {"imu_gyro.z": 0.01 * np.sin(TIME), "heading": 0.01 * np.sin(TIME)}
+    fails(write(tmp_path, columns), words)
+
+
+def test_torques_that_take_what_the_chair_never_had_are_noted(tmp_path):
+    """Positive torque drives forward; brakes that slow the chair down are no such case."""
+    for speed, torque, doubt in ((3.0, -6.0, True), (3.0, 6.0, False), (9.0, -6.0, False)):
+        falls = 0.0 if speed == 3.0 else 2.5
+        rolls = speed - falls * TIME + 0.01 * np.sin(50.0 * TIME)
+        columns = {f"{side}_wheel_speed": rolls for side in SIDES}
+        columns |= {f"{side}_wheel": torque + 0.1 * np.sin(TIME) for side in SIDES}
+        notes = mjchair.read_study(write(tmp_path, columns)).notes
+        assert any("positive torque drives forward" in note for note in notes) == doubt
 
 
 def test_g_is_recognised(tmp_path):

@@ -11,12 +11,12 @@ from dataclasses import dataclass, field, replace
 
 import mujoco
 
-from mjchair.diagnosis.data import standstill, trial_checks, unit_checks
-from mjchair.diagnosis.data.spikes import without_spikes
+from mjchair.diagnosis.data import sign_checks, standstill, trial_checks, unit_checks
+from mjchair.diagnosis.data.lost_samples import without_lost
 from mjchair.errors import MjchairError
 from mjchair.measurement.trial import Trial, check_columns
 from mjchair.model.load import Load
-from mjchair.model.rolling import RearAxle, rear_axle
+from mjchair.model.rolling import RearAxle, chair_body, rear_axle
 from mjchair.model.wheels import WHEELS
 from mjchair.simulation.initial import Initial
 
@@ -115,11 +115,11 @@ def make_study(
     if all(run.hold_out for run in runs):
         raise MjchairError(f"{source}: every trial is held out; leave at least one to fit to")
     model = spec.copy().compile()
-    axle = rear_axle(model)
+    axle, mass = rear_axle(model), float(model.body_subtreemass[chair_body(model)])
     checked, said = [], list(notes or [])
     for run in runs:
         check_columns(run.trial, model)
-        trial, noticed = _checked(run.trial, axle)
+        trial, noticed = _checked(run.trial, axle, mass)
         checked.append(replace(run, trial=trial))
         said += noticed
     said += _without_heading(checked) + _coming_to_rest(checked)
@@ -185,9 +185,9 @@ def _coming_to_rest(runs: list[Run]) -> list[str]:
     return notes
 
 
-def _checked(trial: Trial, axle: RearAxle) -> tuple[Trial, list[str]]:
+def _checked(trial: Trial, axle: RearAxle, mass: float) -> tuple[Trial, list[str]]:
     """The trial as it is used, and what was noticed."""
-    trial, said = without_spikes(trial, axle)
+    trial, said = without_lost(trial, axle)
     stages = (
         trial_checks.measured_part,
         trial_checks.without_dead,
@@ -199,4 +199,4 @@ def _checked(trial: Trial, axle: RearAxle) -> tuple[Trial, list[str]]:
         said += noticed
     trial_checks.check(trial)
     unit_checks.check(trial, axle)
-    return trial, said
+    return trial, said + sign_checks.check(trial, axle, mass)

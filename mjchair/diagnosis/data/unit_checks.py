@@ -2,7 +2,7 @@
 
 In: a trial, and the rear axle of the chair. Out: nothing, or one line that names the channel and
 the unit that it looks like. Three ways to know: no chair is that fast; two channels tell one story
-in two units; a level accelerometer shows gravity.
+in two units, or of two lengths of the way; a level accelerometer shows gravity.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ TURN = 2.0 * np.pi + 0.2  # rad, within which a heading begins
 NEAR = 1.3  # factor within which two stories differ by a unit
 ALIKE = 0.95  # cosine of two stories that are one
 FORWARD, YAW, PULL = 0.05, 0.03, 0.05  # m/s, rad/s and m/s: motion below which nothing is compared
+WAY = 0.5  # m by the wheels, below which it is not compared with the places
+LENGTHS = {"mm": 1e3, "cm": 1e2, "in": 39.37}  # units of a length that people use, a metre
 
 
 class Story(NamedTuple):
@@ -49,9 +51,10 @@ def check(trial: Trial, axle: RearAxle) -> None:
     _check_rates(trial, axle)
     _check_torque(trial)
     _check_gravity(trial)
-    _compare(trial, _forward(trial, axle), FORWARD)
-    _compare(trial, _turning(trial, axle), YAW)
+    _compare(trial, forward(trial, axle), FORWARD)
+    _compare(trial, turning(trial, axle), YAW)
     _compare_with_acceleration(trial, axle)
+    _compare_with_way(trial, axle)
 
 
 def check_initial(given: Mapping[str, object], name: str) -> None:
@@ -149,7 +152,7 @@ def _rate(trial: Trial, name: str, factor: float = 1.0, unit: str = "deg") -> St
     return Story(time, factor * np.gradient(values, time), unit)
 
 
-def _forward(trial: Trial, axle: RearAxle) -> dict[str, Story]:
+def forward(trial: Trial, axle: RearAxle) -> dict[str, Story]:
     """Channel -> how fast the chair rolls by it, m/s."""
     stories = {}
     for side in ("left", "right"):
@@ -164,23 +167,26 @@ def _forward(trial: Trial, axle: RearAxle) -> dict[str, Story]:
     return stories
 
 
-def _turning(trial: Trial, axle: RearAxle) -> dict[str, Story]:
-    """Channel -> how fast the chair turns by it, rad/s."""
+def turning(trial: Trial, axle: RearAxle) -> dict[str, Story]:
+    """Channel -> how fast the chair turns by it, rad/s; "wheels" by the difference of the two."""
     stories = {}
     if "imu_gyro.z" in trial.channels:
         stories["imu_gyro.z"] = _mean(trial, "imu_gyro.z", unit="deg/s")
     if "heading" in trial.channels:
         stories["heading"] = _rate(trial, "heading")
-    wheels = {side: f"{side}_wheel_speed" for side in ("left", "right")}
-    if all(w in trial.channels for w in wheels.values()):
-        left, right = (
-            _mean(trial, w, axle.radius(side) / axle.track) for side, w in wheels.items()
-        )
-        stories["wheels"] = Story(left.time, _at(right, left.time) - left.values, "")
+    rolled = forward(trial, axle)
+    for kind in ("speed", "angle"):
+        names = [f"{side}_wheel_{kind}" for side in ("left", "right")]
+        if all(name in rolled for name in names):
+            left, right = (rolled[name] for name in names)
+            turn = (at(right, left.time) - left.values) / axle.track
+            stories["wheels"] = Story(left.time, turn, "")
+            break
     return stories
 
 
-def _at(story: Story, time: Array) -> Array:
+def at(story: Story, time: Array) -> Array:
+    """A story (n,) at the times given (s); zero where there is none."""
     return np.interp(time, story.time, story.values) if story.time.size else np.zeros(time.size)
 
 
@@ -188,7 +194,7 @@ def _compare(trial: Trial, stories: dict[str, Story], least: float) -> None:
     """Channels that tell one story must tell it in one unit."""
     for pair in combinations(stories, 2):
         grid = stories[pair[0]].time
-        one, two = (_at(stories[name], grid) for name in pair)
+        one, two = (at(stories[name], grid) for name in pair)
         sizes = np.linalg.norm(one), np.linalg.norm(two)
         if min(sizes) <= least * np.sqrt(grid.size) or one @ two < ALIKE * sizes[0] * sizes[1]:
             continue
@@ -200,6 +206,38 @@ def _compare(trial: Trial, stories: dict[str, Story], least: float) -> None:
             _refuse(trial, name, "degrees", why, stories[name].unit)
 
 
+def _compare_with_way(trial: Trial, axle: RearAxle) -> None:
+    """The chair goes as far by its places as by its wheels, and no multiple of it."""
+    wheels = [story for name, story in forward(trial, axle).items() if rolls(name)]
+    places = [_mean(trial, f"position.{axis}") for axis in "xy" if _placed(trial)]
+    if not wheels or not places or min(len(s.time) for s in (*wheels, *places)) < 3:
+        return
+    grid = wheels[0].time
+    speed = np.abs(np.mean([at(story, grid) for story in wheels], axis=0))
+    rolled = float(np.trapezoid(speed, grid))
+    x, y = (at(story, grid) for story in places)
+    gone = float(np.hypot(np.diff(x), np.diff(y)).sum())
+    if rolled < WAY:
+        return
+    why = f"it goes {gone:.4g} m where the wheels roll {rolled:.3g} m"
+    for unit, metre in LENGTHS.items():
+        if metre / NEAR < gone / rolled < metre * NEAR:
+            _refuse(trial, "position.x", unit, why, unit)
+    if 1.0 / NEAR < gone / rolled * axle.left < NEAR and _speeds(trial):
+        raise MjchairError(
+            f"{trial.name}: {_speeds(trial)[0]} looks like m/s: the wheels roll {rolled:.3g} m by "
+            f"it where position goes {gone:.3g} m; divide it by the wheel's radius, {axle.left:g} m"
+        )
+
+
+def _placed(trial: Trial) -> bool:
+    return {"position.x", "position.y"} <= set(trial.channels)
+
+
+def _speeds(trial: Trial) -> list[str]:
+    return [c for c in ("left_wheel_speed", "right_wheel_speed") if c in trial.channels]
+
+
 def _article(name: str) -> str:
     return "the difference of the wheels" if name == "wheels" else name
 
@@ -207,7 +245,7 @@ def _article(name: str) -> str:
 def _compare_with_acceleration(trial: Trial, axle: RearAxle) -> None:
     """A wheel's speed must change as the accelerometer says, but for what a slope does to it."""
     name = "imu_accelerometer.x"
-    speeds = [c for c in ("left_wheel_speed", "right_wheel_speed") if c in trial.channels]
+    speeds = _speeds(trial)
     if name not in trial.channels or not speeds:
         return
     pull = _mean(trial, name)
@@ -215,7 +253,7 @@ def _compare_with_acceleration(trial: Trial, axle: RearAxle) -> None:
     if pull.time.size < 8 or seen.time.size < 8:
         return
     gained = np.r_[0.0, np.cumsum(0.5 * (pull.values[1:] + pull.values[:-1]) * np.diff(pull.time))]
-    speed = _at(seen, pull.time)
+    speed = at(seen, pull.time)
     ramp = np.column_stack([np.ones(pull.time.size), pull.time])  # a slope's part, and a bias'
     speed, gained = (v - ramp @ np.linalg.lstsq(ramp, v, rcond=None)[0] for v in (speed, gained))
     sizes = np.linalg.norm(speed), np.linalg.norm(gained)

@@ -1,9 +1,9 @@
-"""Samples that no chair can show are left out; all that a chair can show stays."""
+"""Samples that are no measurement are left out; all that a chair can show stays."""
 
 import numpy as np
 import pytest
 
-from mjchair.diagnosis.data.spikes import without_spikes
+from mjchair.diagnosis.data.lost_samples import without_lost
 from mjchair.measurement.trial import Trial
 from mjchair.model.rolling import RearAxle
 from mjchair.simulation.inputs import Inputs
@@ -57,7 +57,7 @@ def again(time, rng):
 )
 def test_what_a_chair_can_show_stays(name, make, rate):
     trial = a_trial(rate, **{name: make})
-    kept, said = without_spikes(trial, AXLE)
+    kept, said = without_lost(trial, AXLE)
     assert kept is trial and not said
 
 
@@ -76,7 +76,7 @@ def test_a_spike_is_left_out_and_said_and_nothing_else(name, make, value, last):
     trial = a_trial(**{name: make})
     trial.channels[name][402:last:2] = value
     trial.channels[name][402] = value
-    (kept, said), bad = without_spikes(trial, AXLE), trial.channels[name] == value
+    (kept, said), bad = without_lost(trial, AXLE), trial.channels[name] == value
     np.testing.assert_array_equal(np.isnan(kept.channels[name]), bad)
     assert len(said) == 1 and name in said[0] and "no chair can show" in said[0]
     assert not np.isnan(trial.channels[name]).any()  # the run that was given is as it was
@@ -84,12 +84,42 @@ def test_a_spike_is_left_out_and_said_and_nothing_else(name, make, value, last):
 
 def test_a_spike_of_a_torque_is_left_out():
     trial = a_trial(torque=lambda t: np.where(t == 2.0, 9e9, 5.0), left_wheel_speed=pushed)
-    kept, said = without_spikes(trial, AXLE)
+    kept, said = without_lost(trial, AXLE)
     assert "a sample of left_wheel left out" in said[0]
     assert kept.inputs.at("left_wheel", 2.0) == 5.0
 
 
 def test_a_channel_in_another_unit_is_no_row_of_spikes():
     trial = a_trial(left_wheel_speed=lambda t, rng: np.degrees(pushed(t, rng)))
-    kept, said = without_spikes(trial, AXLE)
+    kept, said = without_lost(trial, AXLE)
+    assert kept is trial and not said
+
+
+def test_a_value_that_is_held_and_then_jumps_is_left_out_and_said():
+    trial = a_trial(left_wheel_speed=pushed)
+    speed = trial.channels["left_wheel_speed"]
+    speed[230:300] = speed[230]
+    kept, said = without_lost(trial, AXLE)
+    gone = np.isnan(kept.channels["left_wheel_speed"])
+    np.testing.assert_array_equal(np.flatnonzero(gone), np.arange(230, 300))
+    assert said == [
+        f"a: left_wheel_speed repeats {speed[230]:.4g} from 2.30 to 2.99 s and then "
+        "jumps; left out there"
+    ]
+
+
+def steady(time, rng):
+    """A power chair gains speed, holds it to the last digit of its encoder, and slows down."""
+    return np.round(np.interp(time, [0.0, 2.0, 5.0, 8.0], [0.0, 3.0, 3.0, 0.0]), 3)
+
+
+def held(time, rng):
+    """Sampled at 10 Hz and written at 100 Hz."""
+    return pushed(np.floor(10.0 * time) / 10.0, np.random.default_rng(0)).round(3)
+
+
+@pytest.mark.parametrize("make", [steady, held, stops])
+def test_a_rate_that_rests_or_is_written_more_often_than_measured_stays(make):
+    trial = a_trial(left_wheel_speed=make)
+    kept, said = without_lost(trial, AXLE)
     assert kept is trial and not said

@@ -1,9 +1,10 @@
-"""Samples that stand alone where no chair can be, as a lost bit or a broken line leaves them.
+"""Samples that are no measurement: spikes of a lost bit, and a value that a broken line repeats.
 
 In: a trial, and the rear axle of the chair. Out: the trial without them, and a note on each
-channel. A sample is such where it passes what a wheelchair shows at all, or where it is far from
-its neighbours on both sides and they are not. Of an accelerometer a shock of one sample is real, so
-there the first alone counts; where many samples are so, the unit is wrong and not the sample.
+channel. A spike passes what a wheelchair shows at all, or is far from its neighbours on both sides
+and they are not. Of an accelerometer a shock of one sample is real, so there the first alone
+counts; where many samples are so, the unit is wrong and not the sample. A value is held where a
+rate that else changes from sample to sample stays the same to the last digit, and then jumps.
 """
 
 from __future__ import annotations
@@ -29,15 +30,22 @@ SCATTER = 90.0  # percentile of the distance from that median: what is usual
 FAR = 30.0  # times the usual, beyond which a sample is alone (assumption)
 STEP = 0.1  # of what a chair shows at most, by which a rate does not change and come back
 SHOCKS = "m/s^2"  # unit of what may be far off for one sample
+HELD = 0.25  # s, and samples, for which no rate of a chair that moves stays the same (assumption)
+HELD_SAMPLES = 10
+CHANGES = 0.9  # of the other steps of such a channel, in which it changes
+JUMP = 10.0  # times its usual step, by which it goes on after that
+MOVES = 0.2  # of what it usually shows; below it the chair may stand
 
 
-def without_spikes(trial: Trial, axle: RearAxle) -> tuple[Trial, list[str]]:
-    """The run without samples that no chair can show, and a note on each channel that had some.
+def without_lost(trial: Trial, axle: RearAxle) -> tuple[Trial, list[str]]:
+    """The run without samples that are no measurement, and a note on each channel that had some.
 
     Args:
       axle: of the chair, for the limits of its wheels.
     """
     channels, said = _cleaned(trial.time, trial.channels, trial.name, axle)
+    channels, held = _without_held(trial.time, channels, trial.name)
+    said += held
     out = replace(trial, channels=channels) if said else trial
     if trial.inputs is None:
         return out, said
@@ -92,3 +100,47 @@ def _spikes(name: str, time: Array, values: Array, axle: RearAxle) -> NDArray[np
     course = np.unwrap(seen) if kind.wraps else seen
     away = np.abs(course - median_filter(course, AROUND, mode="nearest"))
     return np.flatnonzero(beyond | (away > max(FAR * np.percentile(away, SCATTER), step)))
+
+
+def _without_held(
+    time: Array, columns: Mapping[str, Array], run: str
+) -> tuple[Mapping[str, Array], list[str]]:
+    """Columns with NaN where a rate repeats one value, and a note on each."""
+    out, said = dict(columns), []
+    for name, values in columns.items():
+        if sensor(name).most is None or sensor(name).unit == "rad":
+            continue
+        there = np.flatnonzero(np.isfinite(values))
+        for first, last in _held(time[there], values[there]):
+            at = there[first : last + 1]
+            out[name] = np.where(np.isin(np.arange(values.size), at), np.nan, out[name])
+            said.append(
+                f"{run}: {name} repeats {values[at[0]]:.4g} from {time[at[0]]:.2f} to "
+                f"{time[at[-1]]:.2f} s and then jumps; left out there"
+            )
+    return MappingProxyType(out), said
+
+
+def _held(time: Array, values: Array) -> list[tuple[int, int]]:
+    """First and last sample of each part in which a channel repeats one value."""
+    if values.size < 2 * HELD_SAMPLES:
+        return []
+    steps = np.diff(values)
+    edges = np.flatnonzero(np.diff(np.r_[False, steps == 0.0, False].astype(int)))
+    parts = [
+        (int(a), int(b))
+        for a, b in zip(edges[::2], edges[1::2], strict=True)
+        if b - a >= HELD_SAMPLES and time[b] - time[a] >= HELD
+    ]
+    same = np.zeros(steps.size, bool)
+    for a, b in parts:
+        same[a:b] = True
+    others = np.abs(steps[~same])
+    if not parts or others.size == 0 or (others > 0.0).mean() < CHANGES:
+        return []
+    usual, size = float(np.median(others)), float(np.percentile(np.abs(values), 95.0))
+    return [
+        (a, b)
+        for a, b in parts
+        if b < steps.size and abs(steps[b]) > JUMP * usual and abs(values[a]) > MOVES * size
+    ]

@@ -1,0 +1,97 @@
+"""Whether measured channels have the signs that they are taken for.
+
+In: a trial, and the rear axle of the chair. Out: notes, or one line that names the channels. x is
+forward, y left and z up (ISO 8855): wheels count up as the chair rolls forward, a turn to the left
+is positive, and positive torque drives forward. `mjchair gather` finds signs out; a table that was
+written by hand is believed unless two of its channels contradict each other.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from mjchair.diagnosis.data.unit_checks import YAW, Story, at, turning
+from mjchair.errors import MjchairError
+from mjchair.measurement.trial import Trial
+from mjchair.model.rolling import RearAxle
+from mjchair.simulation.table import Array
+
+AGAINST = -0.9  # cosine of two stories that are each other's opposite
+SPUN = 1.0  # rad/s rms by the wheels, which no gyroscope overlooks
+UNSEEN = 0.2  # of that turn, which another channel sees at most where a wheel's sign is wrong
+WORK = 40.0  # J that torques take from a chair, more than it lost: a sign may be wrong (assumption)
+SIDES = ("left", "right")
+
+
+def check(trial: Trial, axle: RearAxle, mass: float) -> list[str]:
+    """Refuse channels that contradict each other by their signs, and note a doubtful torque.
+
+    Args:
+      axle: of the chair. mass: of chair and rider, kg.
+
+    Raises:
+      MjchairError: naming the channels.
+    """
+    stories = turning(trial, axle)
+    for one, two in combinations(stories, 2):
+        _check_pair(trial, (one, two), (stories[one], stories[two]))
+    if "wheels" in stories:
+        for name in stories.keys() - {"wheels"}:
+            _check_spin(trial, name, stories[name], stories["wheels"])
+    return _torque(trial, axle, mass)
+
+
+def _check_pair(trial: Trial, names: tuple[str, str], stories: tuple[Story, Story]) -> None:
+    grid = stories[0].time
+    one, two = (at(story, grid) for story in stories)
+    sizes = np.linalg.norm(one), np.linalg.norm(two)
+    if min(sizes) <= YAW * np.sqrt(grid.size) or one @ two > AGAINST * sizes[0] * sizes[1]:
+        return
+    if "wheels" in names:
+        other = next(name for name in names if name != "wheels")
+        raise MjchairError(
+            f"{trial.name}: {other} turns left where the wheels turn right: the columns of the two "
+            f"wheels are swapped, or {other} has the other sign (a turn to the left is positive)"
+        )
+    raise MjchairError(
+        f"{trial.name}: {names[0]} and {names[1]} turn opposite ways; a turn to the left is "
+        "positive, so turn the sign of one of them"
+    )
+
+
+def _check_spin(trial: Trial, name: str, seen: Story, wheels: Story) -> None:
+    told, other = (np.sqrt(np.mean(s**2)) for s in (wheels.values, at(seen, wheels.time)))
+    if told > SPUN and other < UNSEEN * told:
+        raise MjchairError(
+            f"{trial.name}: the wheels tell a turn of {told:.2g} rad/s, and {name} sees "
+            f"{other:.2g}: does one of them count down as it rolls forward? Turn its sign"
+        )
+
+
+def _torque(trial: Trial, axle: RearAxle, mass: float) -> list[str]:
+    """A note where torques take energy from a chair that it did not have."""
+    if trial.inputs is None:
+        return []
+    work, speeds = 0.0, []
+    for side in SIDES:
+        name = f"{side}_wheel_speed"
+        if name not in trial.channels:
+            return []
+        time, speed = trial.samples(name)
+        if f"{side}_wheel" in trial.inputs.controls:
+            power = trial.inputs.at(f"{side}_wheel", time) * speed
+            work += float(np.trapezoid(power, time))
+        speeds.append(axle.radius(side) * speed)
+    lost = sum(0.25 * mass * (_mean(v[:10]) ** 2 - _mean(v[-10:]) ** 2) for v in speeds)
+    if -work < WORK + max(lost, 0.0):
+        return []
+    return [
+        f"{trial.name}: its torques take {-work:.0f} J from the chair, which had {lost:.0f} J to "
+        "lose: positive torque drives forward; turn their signs, unless the way goes downhill"
+    ]
+
+
+def _mean(values: Array) -> float:
+    return float(np.mean(values))
