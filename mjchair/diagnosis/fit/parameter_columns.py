@@ -19,7 +19,7 @@ from mjchair.diagnosis.replay import derivatives
 from mjchair.diagnosis.replay.derivatives import Column, Point
 from mjchair.diagnosis.replay.window_states import Track
 
-PART = 0.05  # standard deviations of a nuisance by which its derivative is taken
+PART = 0.5  # standard deviations of a nuisance by which its derivative is taken
 FINER = 1.5  # difference of two step sizes to that of this step to none, with a margin
 
 
