@@ -208,6 +208,8 @@ def test_what_is_in_every_explanation_is_said_before_what_is_open():
     assert said.endswith(
         "the corrected chair has **rolling resistance** (coefficient 0.01460 ± 0.00040)."
     )
+    thin = dataclasses.replace(found, effects=[BIAS], alternatives=[])
+    assert "the corrected chair has **sensor bias** on imu_gyro.z (bias 0.1" in words.missing(thin)
     doubted = dataclasses.replace(found, probability={"outside": 0.5, f"toe+{BIAS.key}": 0.5})
     assert words.certain(doubted) == []
 

@@ -52,7 +52,7 @@ def _undecided(diagnosis: Diagnosis) -> str:
     )
     known = certain(diagnosis)
     others = [e for e in diagnosis.effects if e not in known]
-    chosen = " and ".join(map(effect_words, others))
+    chosen = " and ".join(map(effect_words, others or known))
     if not known or not others:
         return f"The chair lacks {doubt}; the corrected chair has {chosen}."
     first = " and ".join(map(effect_words, known))

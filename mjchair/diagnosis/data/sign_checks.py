@@ -16,7 +16,6 @@ from mjchair.diagnosis.data.unit_checks import YAW, Story, at, turning
 from mjchair.errors import MjchairError
 from mjchair.measurement.trial import Trial
 from mjchair.model.rolling import RearAxle
-from mjchair.simulation.table import Array
 
 AGAINST = -0.9  # cosine of two stories that are each other's opposite
 SPUN = 1.0  # rad/s rms by the wheels, which no gyroscope overlooks
@@ -38,8 +37,9 @@ def check(trial: Trial, axle: RearAxle, mass: float) -> list[str]:
     for one, two in combinations(stories, 2):
         _check_pair(trial, (one, two), (stories[one], stories[two]))
     if "wheels" in stories:
-        for name in stories.keys() - {"wheels"}:
-            _check_spin(trial, name, stories[name], stories["wheels"])
+        wheels = stories.pop("wheels")
+        for name, story in stories.items():
+            _check_spin(trial, name, story, wheels)
     return _torque(trial, axle, mass)
 
 
@@ -84,14 +84,10 @@ def _torque(trial: Trial, axle: RearAxle, mass: float) -> list[str]:
             power = trial.inputs.at(f"{side}_wheel", time) * speed
             work += float(np.trapezoid(power, time))
         speeds.append(axle.radius(side) * speed)
-    lost = sum(0.25 * mass * (_mean(v[:10]) ** 2 - _mean(v[-10:]) ** 2) for v in speeds)
+    lost = sum(0.25 * mass * (v[:10].mean() ** 2 - v[-10:].mean() ** 2) for v in speeds)
     if -work < WORK + max(lost, 0.0):
         return []
     return [
         f"{trial.name}: its torques take {-work:.0f} J from the chair, which had {lost:.0f} J to "
         "lose: positive torque drives forward; turn their signs, unless the way goes downhill"
     ]
-
-
-def _mean(values: Array) -> float:
-    return float(np.mean(values))
