@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import ctypes
 import functools
-from pathlib import Path
 from typing import Any
 
 import mujoco
 
-from mjchair.engine.layout import LayoutError
+from mjchair.engine import library
 
 KINDS = int(mujoco.mjtGeom.mjNGEOMTYPES)
 ENTRY = KINDS * int(mujoco.mjtGeom.mjGEOM_HFIELD) + int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
@@ -23,16 +22,8 @@ ENTRY = KINDS * int(mujoco.mjtGeom.mjGEOM_HFIELD) + int(mujoco.mjtGeom.mjGEOM_EL
 
 @functools.cache
 def _table() -> Any:
-    """`mjCOLLISIONFUNC`, one row after the other, in the library that the bindings have loaded."""
-    for path in sorted(Path(mujoco.__file__).parent.glob("*mujoco*")):
-        if path.name.startswith(("libmujoco.", "mujoco.dll")):
-            try:
-                return (ctypes.c_void_p * KINDS**2).in_dll(
-                    ctypes.CDLL(str(path)), "mjCOLLISIONFUNC"
-                )
-            except ValueError:
-                break
-    raise LayoutError(f"mujoco {mujoco.__version__} shows no mjCOLLISIONFUNC; use mujoco 3.17")
+    """`mjCOLLISIONFUNC`, one row after the other."""
+    return (ctypes.c_void_p * KINDS**2).from_address(library.address("mjCOLLISIONFUNC"))
 
 
 def current() -> int:

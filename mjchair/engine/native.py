@@ -1,8 +1,9 @@
 """The compiled callbacks: C functions that MuJoCo calls without Python and without its lock.
 
-In: the offsets of mjchair.engine.layout. Out: the callbacks `act_dyn`, `sensor` and `act_bias`, and
-the collision function of a height field and a tire. They make the views of mjchair.engine.views
-from the addresses that MuJoCo passes, and call the functions of wheel.py, element.py and field.py.
+In: the offsets of mjchair.engine.layout. Out: the callbacks `act_dyn`, `sensor` and `act_bias`, the
+one that only a moving rider needs, and the collision function of a height field and a tire. They
+make the views of mjchair.engine.views from the addresses that MuJoCo passes, and call the functions
+of wheel.py, element.py, field.py and bias_force.py.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from mujoco import mjtStage
 from numba import carray, cfunc, types
 from numba.extending import intrinsic, register_jitable
 
-from mjchair.engine import collision, compiling, element, field, layout, wheel
+from mjchair.engine import bias_force, collision, compiling, element, field, layout, library, wheel
 from mjchair.engine.views import (
     CONTACT,
     DataView,
@@ -32,12 +33,15 @@ from mjchair.engine.views import (
 from mjchair.tire import block
 from mjchair.tire.compiled import DRIVE, ENGINE, TIRE, fingerprint
 
-STAGE_ACC = int(mjtStage.mjSTAGE_ACC)
+STAGE_VEL, STAGE_ACC = int(mjtStage.mjSTAGE_VEL), int(mjtStage.mjSTAGE_ACC)
 NATIVE = "mjchair_native_field_contact"  # MuJoCo's own function, under this name for the linker
 COLLISION = types.int32(
     types.int64, types.int64, types.int64, types.int32, types.int32, types.float64
 )  # model, data, contacts to fill, two geoms, margin -> how many were filled
 native_contact = types.ExternalFunction(NATIVE, COLLISION)
+COM_VEL, RNE = "mjchair_mj_comVel", "mjchair_mj_rne"  # MuJoCo's own, likewise
+com_vel = types.ExternalFunction(COM_VEL, types.void(types.int64, types.int64))
+rne = types.ExternalFunction(RNE, types.void(types.int64, types.int64, types.int32, types.int64))
 BYTES = {"float64": 8, "int32": 4}  # of a number of a contact
 MANY = 1 << 40  # bounds are not checked: only the trailing sizes matter
 
@@ -161,7 +165,7 @@ def field_contact() -> Any:
     sources = fingerprint(*TIRE, *DRIVE, *ENGINE) + mujoco.__version__
     om, od = _offsets("mjModel", FieldModelView), _offsets("mjData", FieldDataView)
     sizes = _sizes()
-    binding.add_symbol(NATIVE, collision.original())
+    _name_functions()
 
     @cfunc(COLLISION, cache=True, error_model="numpy")
     def contact(m: int, d: int, contacts: int, ground: int, tire: int, margin: float) -> int:
@@ -189,6 +193,47 @@ def field_contact() -> Any:
     return contact
 
 
+@register_jitable(forceinline=True)
+def _extrapolate_bias_force(m: int, d: int, om: Any, od: Any, sizes: Any) -> None:
+    """The bias force of a moving rider, if there is one."""
+    model, data = model_view(m, om, sizes), data_view(d, od, sizes)
+    if bias_force.is_asked_for(model):
+        bias_force.step_back(model, data)
+        com_vel(m, d)
+        rne(m, d, 0, _load(d + od.qacc_smooth, types.int64))
+        bias_force.extrapolate(model, data)
+        com_vel(m, d)
+
+
+def _name_functions() -> None:
+    """Tell the linker where MuJoCo's own functions are."""
+    binding.add_symbol(NATIVE, collision.original())
+    binding.add_symbol(COM_VEL, library.address("mj_comVel"))
+    binding.add_symbol(RNE, library.address("mj_rne"))
+
+
+@functools.cache
+@compiling.announced
+def rider_sensor() -> Any:
+    """The compiled callback `mjcb_sensor` of a moving rider without tires, as a Numba cfunc.
+
+    Raises:
+      LayoutError: MuJoCo's memory is not as described.
+    """
+    layout.check()
+    sources = fingerprint(*TIRE, *DRIVE, *ENGINE) + mujoco.__version__
+    om, od, sizes = _offsets("mjModel", ModelView), _offsets("mjData", DataView), _sizes()
+    _name_functions()
+
+    @cfunc(types.void(types.int64, types.int64, types.int32), cache=True, error_model="numpy")
+    def sensor(m: int, d: int, stage: int) -> None:
+        _ = sources
+        if stage == STAGE_VEL:
+            _extrapolate_bias_force(m, d, om, od, sizes)
+
+    return sensor
+
+
 @functools.cache
 @compiling.announced
 def callbacks() -> tuple[Any, Any, Any]:
@@ -203,6 +248,7 @@ def callbacks() -> tuple[Any, Any, Any]:
     layout.check()
     sources = fingerprint(*TIRE, *DRIVE, *ENGINE) + mujoco.__version__
     om, od, sizes = _offsets("mjModel", ModelView), _offsets("mjData", DataView), _sizes()
+    _name_functions()
 
     @cfunc(types.float64(types.int64, types.int64, types.int32), cache=True, error_model="numpy")
     def act_dyn(m: int, d: int, actuator: int) -> float:
@@ -215,6 +261,8 @@ def callbacks() -> tuple[Any, Any, Any]:
         _ = sources
         if stage == STAGE_ACC:
             wheel.sense(model_view(m, om, sizes), data_view(d, od, sizes))
+        elif stage == STAGE_VEL:
+            _extrapolate_bias_force(m, d, om, od, sizes)
 
     @cfunc(types.float64(types.int64, types.int64, types.int32), cache=True, error_model="numpy")
     def act_bias(m: int, d: int, actuator: int) -> float:

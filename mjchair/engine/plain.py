@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 from mujoco import mjtStage
 
-from mjchair.engine import collision, element, field, layout, wheel
+from mjchair.engine import bias_force, collision, element, field, layout, wheel
 from mjchair.engine.views import data_view, model_view
 from mjchair.tire import block
 
@@ -37,9 +37,21 @@ def act_dyn(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float:
 
 
 def sensor(model: mujoco.MjModel, data: mujoco.MjData, stage: int) -> None:
-    """`mjcb_sensor`: loads into the state, and mjchair's sensors."""
-    if stage == mjtStage.mjSTAGE_ACC:
+    """`mjcb_sensor`: a rider's bias force, loads into the state, and mjchair's sensors."""
+    if stage == mjtStage.mjSTAGE_VEL:
+        _extrapolate_bias_force(model, data)
+    elif stage == mjtStage.mjSTAGE_ACC:
         wheel.sense(model_view(model), data_view(data))
+
+
+def _extrapolate_bias_force(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    m, d = model_view(model), data_view(data)
+    if bias_force.is_asked_for(m):
+        bias_force.step_back(m, d)
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_rne(model, data, 0, data.qacc_smooth)
+        bias_force.extrapolate(m, d)
+        mujoco.mj_comVel(model, data)
 
 
 def act_bias(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float:

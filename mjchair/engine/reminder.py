@@ -3,7 +3,9 @@
 In: the function that loads a chair. Out: the same function, which also puts a callback in place
 where there is none. The callback does nothing but warn, at the second step of a model with tires;
 `install` replaces it. It is a C function, so it stands where a Python callback is refused, as in
-`mujoco.batch`; it takes Python's lock for itself.
+`mujoco.batch`; it takes Python's lock for itself. A rider who moves needs no tires to keep the
+common centre of mass where it is, so the callback that does this (mjchair.engine.bias_force) is put
+in place as well.
 """
 
 from __future__ import annotations
@@ -13,16 +15,16 @@ import functools
 import threading
 import warnings
 from collections.abc import Callable
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec
 
 import mujoco
 import numpy as np
 
 from mjchair.engine import layout
+from mjchair.rider import bias_sensor
 from mjchair.tire import block
 
 P = ParamSpec("P")
-R = TypeVar("R")
 
 LINE = (
     "a chair of mjchair is stepped without its tires: call mjchair.install() before mj_step, "
@@ -56,14 +58,18 @@ def _tires(address: int) -> bool:
     return bool(np.any(user[:, block.TAG_AT] == block.TAG))
 
 
-def reminding(load: Callable[P, R]) -> Callable[P, R]:
+def reminding(load: Callable[P, mujoco.MjSpec]) -> Callable[P, mujoco.MjSpec]:
     """The function, which puts the reminder in place where there is no callback."""
 
     @functools.wraps(load)
-    def loaded(*args: P.args, **kwargs: P.kwargs) -> R:
+    def loaded(*args: P.args, **kwargs: P.kwargs) -> mujoco.MjSpec:
         chair = load(*args, **kwargs)
         if mujoco.get_mjcb_act_dyn() is None:
             mujoco.set_mjcb_act_dyn(_reminder())
+        if mujoco.get_mjcb_sensor() is None and bias_sensor.is_in(chair):
+            from mjchair.engine import native
+
+            mujoco.set_mjcb_sensor(native.rider_sensor().ctypes)
         return chair
 
     return loaded

@@ -59,6 +59,7 @@ class ModelView(NamedTuple):
     """Arrays of the model, shaped as in the bindings."""
 
     timestep: Annotated[float, Value("float64", "opt.timestep")]
+    nv: Annotated[int, Value("int64")]
     nsensor: Annotated[int, Value("int64")]
     actuator_trntype: Ints
     actuator_dyntype: Ints
@@ -72,6 +73,7 @@ class ModelView(NamedTuple):
     body_geomadr: Ints
     body_geomnum: Ints
     body_rootid: Ints
+    body_dofadr: Ints
     geom_bodyid: Ints
     geom_size: Triples
     geom_user: Annotated[Array, Rows(width="nuser_geom")]
@@ -89,6 +91,10 @@ class DataView(NamedTuple):
 
     time: Annotated[float, Value("float64")]
     qvel: Reals
+    qacc_warmstart: Reals
+    qacc_smooth: Reals
+    qfrc_smooth: Reals
+    qfrc_bias: Reals
     ctrl: Reals
     act: Reals
     act_dot: Reals

@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 
 from mjchair.errors import MjchairError
-from mjchair.rider import anatomy, driven_joint
+from mjchair.rider import anatomy, bias_sensor, driven_joint
 from mjchair.rider.anatomy import JOINTS, LANDMARKS, SEGMENTS, SIDES, STATURE, joints_of
 from mjchair.rider.driven_joint import Following
 from mjchair.rider.rider import (
@@ -217,6 +217,7 @@ def add(spec: mujoco.MjSpec, model: mujoco.MjModel, rider: Rider, mass: float) -
         bodies[segment.name] = body
     _add_landmarks(bodies, shown, lengths, rider.stature / STATURE)
     _add_inputs(spec, shown.angles)
+    bias_sensor.add(spec, CHAIR)
     return dict(shown.angles)
 
 

@@ -54,7 +54,7 @@ _JOINT_UNITS = {
 }
 _DRIVE = {block.DRIVE: block.DRIVE_SENSOR} | dict.fromkeys(block.MOTORS, block.MOTOR_SENSOR)
 # scalar user sensors of every chair
-_USER_UNITS = {"heading": "rad"}
+_USER_UNITS = {"heading": "rad", "rider_bias_force": "N"}
 
 
 @dataclass(frozen=True)

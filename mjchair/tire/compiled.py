@@ -16,9 +16,16 @@ from pathlib import Path
 # the files that compiled code is made of, below the package
 TIRE = tuple(f"tire/{n}" for n in ("block.py", "families.py", "formula", "law.py", "transient.py"))
 DRIVE = ("drive/block.py", "drive/law.py")
-ENGINE = tuple(
-    f"engine/{n}.py"
-    for n in ("contact", "drivetrain", "element", "field", "native", "views", "wheel")
+ENGINE = (
+    "engine/bias_force.py",
+    "engine/contact.py",
+    "engine/drivetrain.py",
+    "engine/element.py",
+    "engine/field.py",
+    "engine/native.py",
+    "engine/views.py",
+    "engine/wheel.py",
+    "rider/bias_sensor.py",
 )
 
 
