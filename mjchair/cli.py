@@ -67,6 +67,7 @@ Then:
 
 All commands: mjchair --help; options of one: mjchair simulate --help.
 Completion in bash and zsh: {completion.SWITCH}"""
+SHIPPED = ("manual", "power")
 BAD_INPUT = 2
 INTERRUPTED = 130  # as shells have it: 128 + SIGINT
 
@@ -81,6 +82,9 @@ class _Parser(argparse.ArgumentParser):
         self._negative_number_matcher = re.compile(r"^-(\d|\.\d)")
 
     def error(self, message: str) -> NoReturn:
+        stray = re.match(r"unrecognized arguments: (?!-)(\S+)", message)
+        if stray is not None and stray[1] in SHIPPED:
+            message += f"; a chair stands behind its option, --model {stray[1]}"
         self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
 
 

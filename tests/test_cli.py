@@ -247,3 +247,9 @@ def test_models_lists_the_parameters_of_a_chair(capsys):
 
     code, out = run("models", "parameters", capsys=capsys)
     assert code == 0 and all(name in out.out for name in NAMES)
+
+
+def test_a_chair_without_its_option_is_told_of_it(capsys):
+    with pytest.raises(SystemExit):
+        cli.main(["simulate", "manual"])
+    assert "--model manual" in capsys.readouterr().err

@@ -13,7 +13,7 @@ from dataclasses import replace
 from operator import attrgetter
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import hypotheses, open_ended, whole_sizes
+from mjchair.diagnosis.explain import hypotheses, open_ended, profile, whole_sizes
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Tried, is_there
 from mjchair.diagnosis.explain.gap import Gap
@@ -189,11 +189,12 @@ class Fits:
         return known
 
     def last_fit(self, tried: Tried) -> Fitted:
-        """The fit with everything made anew, or a better one from beside its whole sizes.
+        """The fit with everything made anew, or a better one from beside its sizes.
 
         Sizes that are open upwards have a least one.
         """
         fitted = whole_sizes.compared(self.base, self._remade(tried))
+        fitted = profile.followed(self.base, fitted)
         return open_ended.with_least_sizes(self.base, fitted)
 
     def gap_after(self, fitted: Fitted) -> Gap:

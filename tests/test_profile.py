@@ -1,0 +1,100 @@
+"""A fit that is stuck goes along its valley, and says how steep the sides are.
+
+In: chi2 of two sizes, told instead of simulated, and a fit that stops where it began. Out: where
+`followed` ends, and its standard errors.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mjchair.diagnosis.explain import profile
+from mjchair.diagnosis.fit.column_ids import ParameterId
+from mjchair.diagnosis.fit.nonlinear import Fitted
+from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.effects.library import find
+from mjchair.errors import MjchairError
+
+GAIN = find("torque_gain")
+NAMES = ("left", "right")
+TRUTH = np.array([0.5, 0.0])
+# chi2 is long and narrow: two gains that grow together change little
+ALONG, ACROSS = np.array([1.0, 0.7]), np.array([-0.7, 1.0])
+BASE = SimpleNamespace(bench=None, nuisances={})
+
+
+def chi2(sizes):
+    away = np.asarray(sizes) - TRUTH
+    return 3000.0 + (away @ ALONG / 0.06) ** 2 + (away @ ACROSS / 0.01) ** 2
+
+
+def told(sizes, free, promised):
+    values = dict(zip(NAMES, map(float, sizes), strict=True))
+    return Fitted(
+        variant=Variant((), terms=(Term(GAIN, values, free),)),
+        track=None,
+        columns={},
+        system=None,
+        step=np.zeros(0),
+        chi2=np.zeros(0),
+        total=float(chi2(sizes)),
+        promised=promised,
+        std={ParameterId("torque_gain", name): 0.01 for name in free},
+        sigmas={"torque_gain": 40.0},
+        at_bound=(),
+    )
+
+
+@pytest.fixture
+def stuck(monkeypatch):
+    """With both sizes free a fit stays where it began; with one held the other is fitted."""
+
+    def refit(bench, start, before, nuisances=None, rounds=12):
+        (term,) = start.terms
+        sizes = np.array([term.values[name] for name in NAMES])
+        if len(term.free) == 1:
+            k = NAMES.index(term.free[0])
+            tries = np.linspace(-1.0, 1.5, 25001)
+            both = np.repeat(sizes[None], tries.size, axis=0)
+            both[:, k] = tries
+            sizes = both[np.argmin([chi2(row) for row in both])]
+        total = chi2(sizes)
+        return told(sizes, term.free, promised=min(total, 3000.0))
+
+    monkeypatch.setattr(profile, "refit", refit)
+
+
+def valley(at):
+    """The place in the valley's middle, `at` along it from the truth."""
+    return TRUTH + at * ALONG / np.hypot(*ALONG)
+
+
+def test_a_stuck_fit_goes_along_the_valley_and_its_errors_cover(stuck):
+    begun = told(valley(-0.3), NAMES, promised=3000.0)
+    assert begun.total > 3030.0
+    end = profile.followed(BASE, begun)
+    assert end.total < 3015.0
+    assert not end.variant.terms[0].free == ()
+    for name, truth in zip(NAMES, TRUTH, strict=True):
+        away = abs(end.variant.terms[0].values[name] - truth)
+        assert away < 3.0 * end.std[ParameterId("torque_gain", name)]
+        assert end.std[ParameterId("torque_gain", name)] > 0.02
+    assert end.sigmas["torque_gain"] < 40.0
+
+
+def test_a_fit_that_is_not_stuck_is_left_as_it_is(stuck):
+    begun = told(valley(-0.3), NAMES, promised=chi2(valley(-0.3)) - 5.0)
+    assert profile.followed(BASE, begun) is begun
+
+
+def test_where_no_chair_is_beside_it_a_fit_stays(monkeypatch):
+    def never(*_):
+        raise MjchairError("no chair")
+
+    monkeypatch.setattr(profile, "refit", never)
+    begun = told(valley(-0.3), NAMES, promised=3000.0)
+    end = profile.followed(BASE, begun)
+    assert end.total == begun.total and end.std == begun.std
