@@ -9,13 +9,17 @@ from mjchair.diagnosis.explain.screening import LOUD, QUIETER
 from mjchair.errors import MjchairError
 
 
-def taken(monkeypatch, first, other):
+def taken(monkeypatch, first, other, promised=0.0):
     """Power of the noise that is taken, and how many explanations were looked at.
 
     Args:
       first: power that the best explanation leaves. other: the best of a chair hardly shaken.
+      promised: what linear algebra promises of that.
     """
     looked = []
+    by_columns = SimpleNamespace(power=promised)
+    monkeypatch.setattr(screening, "_best_of_sizes", lambda *_: [None])
+    monkeypatch.setattr(screening, "_left_by_columns", lambda *_: by_columns)
 
     def noise_left(base, bench, reduced):
         looked.append(bench)
@@ -30,7 +34,8 @@ def taken(monkeypatch, first, other):
     chosen = []
     monkeypatch.setattr(screening, "_on", lambda base, bench: chosen.append(bench) or base)
     plain = SimpleNamespace(variant=None, track=None, columns=None)
-    screening._with_noise_left(SimpleNamespace(bench="as shown", reduced=None, plain=plain))
+    base = SimpleNamespace(bench="as shown", reduced=None, plain=plain, starts=())
+    screening._with_noise_left(base)
     return chosen[-1].power, len(looked)
 
 
@@ -46,6 +51,20 @@ def test_an_explanation_that_leaves_far_less_noise_is_taken(
     monkeypatch, first, other, power, looks
 ):
     assert taken(monkeypatch, first, other) == (power, looks)
+
+
+@pytest.mark.parametrize(
+    ("first", "promised", "looks"),
+    [
+        (0.5, 0.4 * 0.5, 2),
+        (0.5, 0.6 * 0.5, 1),  # no fit brings what linear algebra does not see at all
+        (1.5, 1.5, 2),  # but where a wheel slides it sees nothing
+    ],
+)
+def test_fits_of_a_quiet_chair_are_made_where_linear_algebra_promises_one(
+    monkeypatch, first, promised, looks
+):
+    assert taken(monkeypatch, first, 0.0, promised)[1] == looks
 
 
 def told(total, promised=None, bound=(), offset=0.0):

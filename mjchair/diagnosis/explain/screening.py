@@ -42,6 +42,7 @@ SEEN = 1.0  # sigmas that one standard deviation of a nuisance changes
 FAR = 2.5  # prior standard deviations: a nuisance there is not what moved
 LOUD = 0.01  # share of the power that may shake a chair: below it noise hides nothing
 QUIETER = 0.25  # of the power of what shakes the chair: an explanation that leaves less is right
+PROMISES = 0.5  # of it, that linear algebra must promise before this is tried
 ROUNDS = 4  # of the fit of what may be no noise: where it is right they are enough
 TRIED, OF_A_SIZE = 6, 3  # hypotheses, and of one size, that are fitted until one holds
 AT_REST = 0.01  # m/s^2, bias of an accelerometer that was seen at rest
@@ -152,12 +153,35 @@ def _with_noise_left(base: Base) -> Base:
     that hardly is stands beside it; it is right where it leaves far less.
     """
     bench, best = _noise_left(base, base.bench, base.reduced)
-    if noise_shown.loudness(bench) > LOUD:
+    loud = noise_shown.loudness(bench)
+    if loud > LOUD:
         hushed = noise_shown.hushed(base.bench)
-        quieter, other = _noise_left(base, hushed, _reduced_anew(_on(base, hushed)).reduced)
-        if noise_shown.loudness(quieter) < QUIETER * noise_shown.loudness(bench):
-            bench, best = quieter, other
+        reduced = _reduced_anew(_on(base, hushed)).reduced
+        if _may_be_quieter(base, reduced, loud):
+            quieter, other = _noise_left(base, hushed, reduced)
+            if noise_shown.loudness(quieter) < QUIETER * loud:
+                bench, best = quieter, other
     return replace(with_noise(base, bench), best=best)
+
+
+def _may_be_quieter(base: Base, reduced: Reduced, loud: float) -> bool:
+    """Whether any hypothesis may leave far less noise than there is, by linear algebra.
+
+    The fits that tell it for sure take up to a third of a diagnosis, and linear algebra is right
+    within a factor of two. It is not where the noise is all that is believed of it: a wheel slides.
+    """
+    if loud >= 1.0:
+        return True
+    return any(
+        noise_shown.loudness(_left_by_columns(base, h)) < PROMISES * loud
+        for h in _best_of_sizes(reduced, base.starts)[:TRIED]
+    )
+
+
+def _left_by_columns(base: Base, hypothesis: Hypothesis) -> Bench:
+    """The bench with the noise that a hypothesis leaves by linear algebra alone."""
+    own: dict[ColumnId, Column] = {c: base.columns[c] for c in hypothesis.columns}
+    return noise_shown.left_by(base.bench, base.around.track, base.nuisances, own)[0]
 
 
 def with_noise(base: Base, bench: Bench) -> Base:
