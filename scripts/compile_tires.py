@@ -10,4 +10,5 @@ from mjchair.model.spec import read_tire
 
 native.callbacks()
 native.field_contact()
+native.rider_sensor()
 read_tire("wheelchair").forces(200.0, 0.0, 0.1)

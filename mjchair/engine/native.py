@@ -153,6 +153,20 @@ def _sizes() -> Sizes:
     )
 
 
+def _closure(model: Any, data: Any) -> tuple[str, Any, Any, Sizes]:
+    """What a callback closes over: digest of its sources, offsets of its two views, and sizes.
+
+    Raises:
+      LayoutError: MuJoCo's memory is not as described.
+    """
+    layout.check()
+    binding.add_symbol(NATIVE, collision.original())
+    binding.add_symbol(COM_VEL, library.address("mj_comVel"))
+    binding.add_symbol(RNE, library.address("mj_rne"))
+    sources = fingerprint(*TIRE, *DRIVE, *ENGINE) + mujoco.__version__
+    return sources, _offsets("mjModel", model), _offsets("mjData", data), _sizes()
+
+
 @functools.cache
 @compiling.announced
 def field_contact() -> Any:
@@ -161,11 +175,7 @@ def field_contact() -> Any:
     Raises:
       LayoutError: MuJoCo's memory is not as described.
     """
-    layout.check()
-    sources = fingerprint(*TIRE, *DRIVE, *ENGINE) + mujoco.__version__
-    om, od = _offsets("mjModel", FieldModelView), _offsets("mjData", FieldDataView)
-    sizes = _sizes()
-    _name_functions()
+    sources, om, od, sizes = _closure(FieldModelView, FieldDataView)
 
     @cfunc(COLLISION, cache=True, error_model="numpy")
     def contact(m: int, d: int, contacts: int, ground: int, tire: int, margin: float) -> int:
@@ -205,13 +215,6 @@ def _extrapolate_bias_force(m: int, d: int, om: Any, od: Any, sizes: Any) -> Non
         com_vel(m, d)
 
 
-def _name_functions() -> None:
-    """Tell the linker where MuJoCo's own functions are."""
-    binding.add_symbol(NATIVE, collision.original())
-    binding.add_symbol(COM_VEL, library.address("mj_comVel"))
-    binding.add_symbol(RNE, library.address("mj_rne"))
-
-
 @functools.cache
 @compiling.announced
 def rider_sensor() -> Any:
@@ -220,10 +223,7 @@ def rider_sensor() -> Any:
     Raises:
       LayoutError: MuJoCo's memory is not as described.
     """
-    layout.check()
-    sources = fingerprint(*TIRE, *DRIVE, *ENGINE) + mujoco.__version__
-    om, od, sizes = _offsets("mjModel", ModelView), _offsets("mjData", DataView), _sizes()
-    _name_functions()
+    sources, om, od, sizes = _closure(ModelView, DataView)
 
     @cfunc(types.void(types.int64, types.int64, types.int32), cache=True, error_model="numpy")
     def sensor(m: int, d: int, stage: int) -> None:
@@ -245,10 +245,7 @@ def callbacks() -> tuple[Any, Any, Any]:
     Raises:
       LayoutError: MuJoCo's memory is not as described.
     """
-    layout.check()
-    sources = fingerprint(*TIRE, *DRIVE, *ENGINE) + mujoco.__version__
-    om, od, sizes = _offsets("mjModel", ModelView), _offsets("mjData", DataView), _sizes()
-    _name_functions()
+    sources, om, od, sizes = _closure(ModelView, DataView)
 
     @cfunc(types.float64(types.int64, types.int64, types.int32), cache=True, error_model="numpy")
     def act_dyn(m: int, d: int, actuator: int) -> float:
