@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from mjchair.diagnosis.explain.column_ids import Quantity
+from mjchair.diagnosis.fit.process import Part
 from mjchair.diagnosis.next_experiment.wording import plain
 from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.result import (
@@ -25,7 +26,7 @@ from mjchair.diagnosis.rules import LEVEL, PARTLY, PROBABLE, Verdict
 LEAST = 1e-6  # a chance below this is said to be below it
 # what a force may go with that is not known where nothing tells how the chair turns
 TURNING = (Quantity.YAW_RATE, Quantity.HEADING, Quantity.SWIVEL, Quantity.RIGHT_TURN)
-TURNS = {"wheel_turn": "once a turn of the rear wheels", "caster_turn": "once a turn of casters"}
+TURNS = {"wheel_turn": str(Part.WHEEL_TURN), "caster_turn": str(Part.CASTER_TURN)}
 CLEAR = 0.5  # of what shakes the chair forward: a force once a turn of this size is told
 UNSURE = 0.005  # probabilities below this are not named
 
