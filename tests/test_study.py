@@ -113,6 +113,16 @@ def test_channels_that_contradict_each_other_are_named(changed, words, tmp_path)
     fails(write(tmp_path, columns), words)
 
 
+@pytest.mark.parametrize("gain", [0.5, 0.7, 1.3, 1.5])
+@pytest.mark.parametrize("bends", [True, False])
+def test_a_wheel_whose_sensor_has_a_gain_has_its_sign(gain, bends, tmp_path):
+    """It tells a turn that no gyroscope sees, and is what the diagnosis is asked about."""
+    columns = on_a_bend(left_wheel_speed=lambda c: gain * c["left_wheel_speed"])
+    if not bends:
+        columns |= {"imu_gyro.z": 0.01 * np.sin(TIME), "heading": 0.01 * np.sin(TIME)}
+    mjchair.read_study(write(tmp_path, columns))
+
+
 def test_torques_that_take_what_the_chair_never_had_are_noted(tmp_path):
     """Positive torque drives forward; brakes that slow the chair down are no such case."""
     for speed, torque, doubt in ((3.0, -6.0, True), (3.0, 6.0, False), (9.0, -6.0, False)):

@@ -32,10 +32,18 @@ def material(base: Base, gap: Gap, choice: Choice | None) -> Material:
     """The largest missing force of a study, and its limit.
 
     The force is the one that does what the best explanation does: the chosen effects, or without
-    any the force that the tests see best.
+    any the force that the tests see best. Of an effect that makes a wheel slide or shimmy no column
+    tells how large that is, so it counts as larger than any limit.
     """
     study = base.bench.simulator.study
+    if choice is not None and _is_of_whole_size(choice):
+        return Material(float("inf"), limit(study))
     return Material(largest(base, _explaining(base, gap, choice)), limit(study))
+
+
+def _is_of_whole_size(choice: Choice) -> bool:
+    """Whether a chosen effect has sizes at which a chair does what no small change foretells."""
+    return any(p.whole for term in choice.fitted.variant.terms for _, p in term.parameters)
 
 
 def limit(study: Study) -> float:

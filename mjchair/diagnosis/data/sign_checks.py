@@ -12,12 +12,12 @@ from itertools import combinations
 
 import numpy as np
 
-from mjchair.diagnosis.data.unit_checks import YAW, Story, at, turning
+from mjchair.diagnosis.data.unit_checks import YAW, Story, at, forward, turning
 from mjchair.errors import MjchairError
 from mjchair.measurement.trial import Trial
 from mjchair.model.rolling import RearAxle
 
-AGAINST = -0.9  # cosine of two stories that are each other's opposite
+LEFT_OVER = 0.4  # of two stories, that their sum is at most where they are each other's opposite
 SPUN = 1.0  # rad/s rms by the wheels, which no gyroscope overlooks
 UNSEEN = 0.2  # of that turn, which another channel sees at most where a wheel's sign is wrong
 WORK = 40.0  # J that torques take from a chair, more than it lost: a sign may be wrong (assumption)
@@ -39,15 +39,12 @@ def check(trial: Trial, axle: RearAxle, mass: float) -> list[str]:
     if "wheels" in stories:
         wheels = stories.pop("wheels")
         for name, story in stories.items():
-            _check_spin(trial, name, story, wheels)
+            _check_spin(trial, axle, (name, story), wheels)
     return _torque(trial, axle, mass)
 
 
 def _check_pair(trial: Trial, names: tuple[str, str], stories: tuple[Story, Story]) -> None:
-    grid = stories[0].time
-    one, two = (at(story, grid) for story in stories)
-    sizes = np.linalg.norm(one), np.linalg.norm(two)
-    if min(sizes) <= YAW * np.sqrt(grid.size) or one @ two > AGAINST * sizes[0] * sizes[1]:
+    if not _are_opposite(stories, YAW):
         return
     if "wheels" in names:
         other = next(name for name in names if name != "wheels")
@@ -61,13 +58,34 @@ def _check_pair(trial: Trial, names: tuple[str, str], stories: tuple[Story, Stor
     )
 
 
-def _check_spin(trial: Trial, name: str, seen: Story, wheels: Story) -> None:
-    told, other = (np.sqrt(np.mean(s**2)) for s in (wheels.values, at(seen, wheels.time)))
-    if told > SPUN and other < UNSEEN * told:
-        raise MjchairError(
-            f"{trial.name}: the wheels tell a turn of {told:.2g} rad/s, and {name} sees "
-            f"{other:.2g}: does one of them count down as it rolls forward? Turn its sign"
-        )
+def _are_opposite(stories: tuple[Story, Story], least: float) -> bool:
+    """Whether two stories are one another's negative, in size as well.
+
+    A sensor with a gain of 1.5 may tell a turn the other way, and its sign is right.
+
+    Args:
+      least: rms below which a story tells nothing.
+    """
+    grid = stories[0].time
+    one, two = (at(story, grid) for story in stories)
+    sizes = np.linalg.norm(one), np.linalg.norm(two)
+    told = min(sizes) > least * np.sqrt(grid.size)
+    return bool(told and np.linalg.norm(one + two) < LEFT_OVER * max(sizes))
+
+
+def _check_spin(trial: Trial, axle: RearAxle, seen: tuple[str, Story], wheels: Story) -> None:
+    name, story = seen
+    told, other = (np.sqrt(np.mean(s**2)) for s in (wheels.values, at(story, wheels.time)))
+    if told < SPUN or other > UNSEEN * told:
+        return
+    rolled = forward(trial, axle)
+    for kind in ("speed", "angle"):
+        sides = [rolled[n] for n in (f"{s}_wheel_{kind}" for s in SIDES) if n in rolled]
+        if len(sides) == 2 and _are_opposite((sides[0], sides[1]), 0.0):
+            raise MjchairError(
+                f"{trial.name}: the wheels tell a turn of {told:.2g} rad/s, and {name} sees "
+                f"{other:.2g}: does one of them count down as it rolls forward? Turn its sign"
+            )
 
 
 def _torque(trial: Trial, axle: RearAxle, mass: float) -> list[str]:
