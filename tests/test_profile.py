@@ -6,12 +6,14 @@ In: chi2 of two sizes, told instead of simulated, and a fit that stops where it 
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from mjchair.diagnosis.explain import profile
+from mjchair.diagnosis.explain.fits import with_form_errors
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.variant import Term, Variant
@@ -98,3 +100,22 @@ def test_where_no_chair_is_beside_it_a_fit_stays(monkeypatch):
     begun = told(valley(-0.3), NAMES, promised=3000.0)
     end = profile.followed(BASE, begun)
     assert end.total == begun.total and end.std == begun.std
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "own", "least"),
+    [
+        ("wheel_radius", 0.0022, 1e-5, 2.2e-5),  # 220 standard errors are more than a form tells
+        ("wheel_radius", 0.0022, 3e-4, 3e-4),
+        ("tire_friction", 0.26, 3e-4, 7.4e-3),  # the size is how far it is from no effect
+    ],
+)
+def test_no_size_is_told_better_than_the_form_of_its_effect(name, value, own, least):
+    effect = find(name)
+    p = next(p for p in effect.fitted if p.sized)
+    key = ParameterId(effect.key, p.name)
+    fitted = told(TRUTH, NAMES, 3000.0)
+    term = Term(effect, effect.neutral() | {p.name: value}, (p.name,))
+    fitted.variant, fitted.std = Variant((), terms=(term,)), {key: own}
+    assert with_form_errors(fitted).std[key] == pytest.approx(math.hypot(own, least), rel=0.3)
+    assert with_form_errors(fitted).std[key] >= max(own, 0.99 * least)

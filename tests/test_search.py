@@ -81,6 +81,7 @@ def fits(monkeypatch):
     monkeypatch.setattr(whole_sizes, "fits", lambda *_: ())
     monkeypatch.setattr(whole_sizes, "compared", lambda _, fitted: fitted)
     monkeypatch.setattr(open_ended, "with_least_sizes", lambda _, fitted: fitted)
+    monkeypatch.setattr(fits_of_hypotheses, "with_form_errors", lambda fitted: fitted)
     monkeypatch.setattr(multistart, "refit", refit)
     monkeypatch.setattr(hypotheses, "terms", terms)
     return SimpleNamespace(asked=asked, answers=answers)

@@ -28,6 +28,7 @@ HELD = 10.0  # chi2 that it must bring on runs that it was not fitted to
 SIGMAS = 4.0  # standard errors of a parameter away from neutral
 # what keeps a rival
 RIVAL_CHI2 = 10.0  # a rival this near, in chi2 with its penalty, is not ruled out
+SIZE_BY_FORM = 0.01  # of an effect's size: the form of no effect tells it better (assumption)
 FORM = 0.02  # of the gain: the form of no effect is better known (assumption)
 REPLACES = 0.5  # of what an effect brings: what misses more of it does not stand in its place
 FAR_BEHIND = 3.0  # times what keeps a rival: a fit that promises no more is not started again

@@ -7,6 +7,7 @@ the chair without effects, or around a fit.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -195,7 +196,7 @@ class Fits:
         """
         fitted = whole_sizes.compared(self.base, self._remade(tried))
         fitted = profile.followed(self.base, fitted)
-        return open_ended.with_least_sizes(self.base, fitted)
+        return with_form_errors(open_ended.with_least_sizes(self.base, fitted))
 
     def gap_after(self, fitted: Fitted) -> Gap:
         """The gap that a fit leaves."""
@@ -209,6 +210,21 @@ class Fits:
 def _of(hypothesis: Hypothesis, fits: Sequence[Tried]) -> Fitted | None:
     """The fit of a hypothesis among others; None: it is not there."""
     return next((t.fitted for t in fits if t.hypothesis.starts == hypothesis.starts), None)
+
+
+def with_form_errors(fitted: Fitted) -> Fitted:
+    """The fit, with standard errors that the form of its effects allows.
+
+    At hundreds of standard errors the data tell a size better than its effect tells what a chair
+    does. The errors of sensors have the form that they are given.
+    """
+    std = dict(fitted.std)
+    for term in fitted.variant.terms:
+        for key, p in term.parameters:
+            if p.sized and term.effect.sensor is None:
+                size = abs(term.values[p.name] - p.neutral)
+                std[key] = math.hypot(std[key], rules.SIZE_BY_FORM * size)
+    return replace(fitted, std=std)
 
 
 def goes_far(fitted: Fitted) -> bool:
