@@ -11,6 +11,8 @@ from __future__ import annotations
 import statistics
 import time
 import warnings
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -21,6 +23,7 @@ from mjchair.rider.stroke import Stroke, push_motion
 
 SECONDS = 2.0
 STEPS = (0.002, 0.001, 0.0005)
+TRUNK = ("trunk_flexion",)
 
 
 def model_of(timestep: float, bias_force: bool = True) -> mujoco.MjModel:
@@ -31,13 +34,16 @@ def model_of(timestep: float, bias_force: bool = True) -> mujoco.MjModel:
     return spec.compile()
 
 
-def nod(model: mujoco.MjModel, angle: float, frequency: float) -> np.ndarray:
-    """Inputs (steps, nu) of a trunk that bends by `angle` (rad) and back."""
+def swing(
+    model: mujoco.MjModel, joints: Sequence[str], angle: float, frequency: float
+) -> np.ndarray:
+    """Inputs (steps, nu) of the rider's joints that swing from zero to `angle` (rad) and back."""
     at = np.arange(0.0, SECONDS, model.opt.timestep)
     inputs = np.zeros((at.size, model.nu))
-    inputs[:, model.actuator("rider_trunk_flexion").id] = (
-        0.5 * angle * (1.0 - np.cos(2.0 * np.pi * frequency * at))
-    )
+    for name in joints:
+        inputs[:, model.actuator("rider_" + name).id] = (
+            0.5 * angle * (1.0 - np.cos(2.0 * np.pi * frequency * at))
+        )
     return inputs
 
 
@@ -51,8 +57,25 @@ def strokes(model: mujoco.MjModel) -> np.ndarray:
     return inputs
 
 
-def wandering(model: mujoco.MjModel, inputs: np.ndarray) -> tuple[float, float]:
-    """How far (m) the common centre of mass and the chair go, without tires."""
+class Wandering(NamedTuple):
+    """What a motion does on a floor without friction.
+
+    Attributes:
+      centre: how far the common centre of mass goes, m. turn: largest angular momentum about the
+        vertical, kg m^2/s. chair: how far the chair goes, m.
+    """
+
+    centre: float
+    turn: float
+    chair: float
+
+
+def wandering(model: mujoco.MjModel, inputs: np.ndarray) -> Wandering:
+    """What inputs (steps, nu) do to a chair without tires, which is on a floor without friction.
+
+    MuJoCo's speeds belong to the middle of the step that led to them, so the angular momentum is
+    taken at the places half a step before.
+    """
     data, root = mujoco.MjData(model), model.body("chair").id
     data.ctrl[:] = inputs[0]
     for _ in range(round(1.0 / model.opt.timestep)):  # on to its wheels, into the first posture
@@ -60,15 +83,23 @@ def wandering(model: mujoco.MjModel, inputs: np.ndarray) -> tuple[float, float]:
         data.qvel[:] *= 0.9
     data.qvel[:], data.time = 0.0, 0.0
     mujoco.mj_forward(model, data)
-    began, chair, went, moved = data.subtree_com[root].copy(), data.qpos[0], 0.0, 0.0
+    began, chair = data.subtree_com[root].copy(), data.qpos[0]
+    centre = turn = moved = 0.0
+    middle = mujoco.MjData(model)
     for row in inputs:
         data.ctrl[:] = row
         mujoco.mj_step(model, data)
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
-        went = max(went, np.abs((data.subtree_com[root] - began)[:2]).max())
+        centre = max(centre, np.abs((data.subtree_com[root] - began)[:2]).max())
         moved = max(moved, abs(data.qpos[0] - chair))
-    return went, moved
+        middle.qpos[:], middle.qvel[:] = data.qpos, data.qvel
+        mujoco.mj_integratePos(model, middle.qpos, data.qvel, -0.5 * model.opt.timestep)
+        for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel):
+            stage(model, middle)
+        mujoco.mj_subtreeVel(model, middle)
+        turn = max(turn, abs(middle.subtree_angmom[root][2]))
+    return Wandering(centre, turn, moved)
 
 
 def step_time(model: mujoco.MjModel) -> float:
@@ -84,8 +115,8 @@ def main() -> None:
     """Print the table and the cost."""
     warnings.simplefilter("ignore")  # of the missing tires, which are missing on purpose
     motions = {
-        "trunk, 0.1 rad peak to peak, 1 Hz": lambda model: nod(model, 0.1, 1.0),
-        "trunk, 0.3 rad peak to peak, 2 Hz": lambda model: nod(model, 0.3, 2.0),
+        "trunk, 0.1 rad peak to peak, 1 Hz": lambda model: swing(model, TRUNK, 0.1, 1.0),
+        "trunk, 0.3 rad peak to peak, 2 Hz": lambda model: swing(model, TRUNK, 0.3, 2.0),
         "strokes of both arms and trunk, one a second": strokes,
     }
     print("| motion | 2 ms | 1 ms | 0.5 ms | 2 ms, MuJoCo's own step | the chair moves by |")
@@ -93,9 +124,9 @@ def main() -> None:
     for name, motion in motions.items():
         went = [wandering(model, motion(model)) for model in map(model_of, STEPS)]
         bare = model_of(STEPS[0], bias_force=False)
-        numbers = [*(w[0] for w in went), wandering(bare, motion(bare))[0]]
+        numbers = [*(w.centre for w in went), wandering(bare, motion(bare)).centre]
         cells = " | ".join(f"{number:.1e} m" for number in numbers)
-        print(f"| {name} | {cells} | {went[0][1]:.3f} m |")
+        print(f"| {name} | {cells} | {went[0].chair:.3f} m |")
     with mjchair.installed():
         rigid = mjchair.load_spec("manual").compile()
         models = (model_of(0.002), model_of(0.002, bias_force=False), rigid)

@@ -33,6 +33,7 @@ from mjchair.commands import (
     view,
 )
 from mjchair.errors import MjchairError, MjchairNote
+from mjchair.model import assets
 
 COMMANDS = (
     simulate,
@@ -67,7 +68,6 @@ Then:
 
 All commands: mjchair --help; options of one: mjchair simulate --help.
 Completion in bash and zsh: {completion.SWITCH}"""
-SHIPPED = ("manual", "power")
 BAD_INPUT = 2
 INTERRUPTED = 130  # as shells have it: 128 + SIGINT
 
@@ -83,7 +83,7 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         stray = re.match(r"unrecognized arguments: (?!-)(\S+)", message)
-        if stray is not None and stray[1] in SHIPPED:
+        if stray is not None and stray[1] in assets.chairs():
             message += f"; a chair stands behind its option, --model {stray[1]}"
         self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
 

@@ -21,7 +21,7 @@ def taken(monkeypatch, first, other, promised=0.0):
     monkeypatch.setattr(screening, "_best_of_sizes", lambda *_: [None])
     monkeypatch.setattr(screening, "_left_by_columns", lambda *_: by_columns)
 
-    def noise_left(base, bench, reduced):
+    def noise_left(base, bench, reduced, options):
         looked.append(bench)
         return SimpleNamespace(power=other if bench == "hushed" else first), None
 

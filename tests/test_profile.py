@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mjchair.diagnosis.explain import profile
+from mjchair.diagnosis.explain import multistart, profile
 from mjchair.diagnosis.explain.fits import with_form_errors
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted
@@ -66,7 +66,7 @@ def stuck(monkeypatch):
         total = chi2(sizes)
         return told(sizes, term.free, promised=min(total, 3000.0))
 
-    monkeypatch.setattr(profile, "refit", refit)
+    monkeypatch.setattr(multistart, "refit", refit)
 
 
 def valley(at):
@@ -96,7 +96,7 @@ def test_where_no_chair_is_beside_it_a_fit_stays(monkeypatch):
     def never(*_):
         raise MjchairError("no chair")
 
-    monkeypatch.setattr(profile, "refit", never)
+    monkeypatch.setattr(multistart, "refit", never)
     begun = told(valley(-0.3), NAMES, promised=3000.0)
     end = profile.followed(BASE, begun)
     assert end.total == begun.total and end.std == begun.std

@@ -1,5 +1,6 @@
 """A rider who moves: masses of de Leva, inputs that are followed, momentum that is kept."""
 
+import momentum
 import mujoco
 import numpy as np
 import pytest
@@ -301,74 +302,34 @@ def test_a_rider_that_cannot_be(tmp_path):
         seat.add(empty, empty.compile(), Rider(), 75.0)
 
 
-def swinging(angle, frequency, joints):
-    """Inputs of joints that swing from zero to `angle` (rad) and back."""
-
-    def give(data):
-        swing = 0.5 * angle * (1.0 - np.cos(2.0 * np.pi * frequency * data.time))
-        for name in joints:
-            data.actuator("rider_" + name).ctrl[0] = swing
-
-    return give
-
-
 MOTIONS = {
-    "trunk": swinging(0.1, 1.0, ("trunk_flexion",)),
-    "fast": swinging(0.3, 2.0, ("trunk_flexion",)),
-    "all": swinging(0.2, 2.0, ("trunk_flexion", "trunk_twist", "left_shoulder_flexion")),
+    "trunk": (("trunk_flexion",), 0.1, 1.0),
+    "fast": (("trunk_flexion",), 0.3, 2.0),
+    "all": (("trunk_flexion", "trunk_twist", "left_shoulder_flexion"), 0.2, 2.0),
 }
 
 
-def wandering(motion, timestep=0.002, bias_force=True):
-    """How far the common centre of mass goes in 1 s on a frictionless floor (m), how large the
-    angular momentum about the vertical gets (kg m^2/s), and how far the chair goes (m).
-
-    A chair without its tires is on such a floor. MuJoCo's speeds belong to the middle of the step
-    that led to them, so the angular momentum is taken at the places half a step before.
-    """
-    spec = mjchair.load_spec("manual", rider="moving", timestep=timestep)
-    if not bias_force:
-        spec.delete(spec.sensor("rider_bias_force"))
-    model = spec.compile()
-    data, root = mujoco.MjData(model), model.body("chair").id
-    for _ in range(round(1.0 / timestep)):  # on to its tires
-        mujoco.mj_step(model, data)
-        data.qvel[:] *= 0.9
-    data.qvel[:], data.time = 0.0, 0.0
-    mujoco.mj_forward(model, data)
-    began, chair, went, turned, moved = data.subtree_com[root].copy(), data.qpos[0], 0.0, 0.0, 0.0
-    middle = mujoco.MjData(model)
-    for _ in range(round(1.0 / timestep)):
-        motion(data)
-        mujoco.mj_step(model, data)
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        went = max(went, np.abs((data.subtree_com[root] - began)[:2]).max())
-        middle.qpos[:], middle.qvel[:] = data.qpos, data.qvel
-        mujoco.mj_integratePos(model, middle.qpos, data.qvel, -0.5 * timestep)
-        for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel):
-            stage(model, middle)
-        mujoco.mj_subtreeVel(model, middle)
-        turned = max(turned, abs(middle.subtree_angmom[root][2]))
-        moved = max(moved, abs(data.qpos[0] - chair))
-    return went, turned, moved
+def moves(name, timestep=0.002, bias_force=True):
+    """What a motion does on a floor without friction."""
+    model = momentum.model_of(timestep, bias_force)
+    return momentum.wandering(model, momentum.swing(model, *MOTIONS[name]))
 
 
 @pytest.mark.parametrize("name", MOTIONS)
 def test_the_common_centre_of_mass_stays_where_it_is(name):
-    """A force of 0.001 N from outside would move it by 6e-6 m in the second. The trunk that twists
+    """A force of 0.001 N from outside would move it by 6e-6 m in a second. The trunk that twists
     has an angular momentum of 0.6 kg m^2/s."""
-    went, turned, moved = wandering(MOTIONS[name])
-    assert moved > 0.01
-    assert went < 1e-6
-    assert turned < 5e-5
+    found = moves(name)
+    assert found.chair > 0.01
+    assert found.centre < 1e-6
+    assert found.turn < 5e-5
 
 
 def test_momentum_is_kept_to_the_second_order_of_the_step():
-    coarse, fine = wandering(MOTIONS["fast"], 0.002), wandering(MOTIONS["fast"], 0.001)
-    assert fine[0] < 0.3 * coarse[0]
-    bare = wandering(MOTIONS["fast"], bias_force=False)
-    assert bare[0] > 50.0 * coarse[0]
+    coarse, fine = moves("fast", 0.002), moves("fast", 0.001)
+    assert fine.centre < 0.3 * coarse.centre
+    bare = moves("fast", bias_force=False)
+    assert bare.centre > 50.0 * coarse.centre
 
 
 def test_the_bias_force_is_the_same_compiled_and_in_python_and_a_rigid_rider_has_none():
@@ -377,8 +338,8 @@ def test_the_bias_force_is_the_same_compiled_and_in_python_and_a_rigid_rider_has
     for compiled in (True, False):
         with mjchair.installed(compiled=compiled):
             data = mujoco.MjData(model)
-            for _ in range(100):
-                MOTIONS["all"](data)
+            for row in momentum.swing(model, *MOTIONS["all"])[:100]:
+                data.ctrl[:] = row
                 mujoco.mj_step(model, data)
             found.append(np.r_[data.qpos, data.qvel, data.sensor("rider_bias_force").data])
     np.testing.assert_allclose(*found, rtol=1e-9, atol=1e-9)
@@ -391,8 +352,8 @@ def test_forward_and_inverse_dynamics_leave_the_state_as_it_was():
     with mjchair.installed():
         model = mjchair.load_spec("manual", rider="moving").compile()
         data = mujoco.MjData(model)
-        for _ in range(50):
-            MOTIONS["all"](data)
+        for row in momentum.swing(model, *MOTIONS["all"])[:50]:
+            data.ctrl[:] = row
             mujoco.mj_step(model, data)
         mujoco.mj_forward(model, data)
         kept = [np.copy(a) for a in (data.qvel, data.qacc, data.cvel, data.sensordata)]

@@ -14,7 +14,7 @@ from typing import Any
 
 import mujoco
 
-from mjchair.engine import library
+from mjchair.engine import layout
 
 KINDS = int(mujoco.mjtGeom.mjNGEOMTYPES)
 ENTRY = KINDS * int(mujoco.mjtGeom.mjGEOM_HFIELD) + int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
@@ -23,7 +23,7 @@ ENTRY = KINDS * int(mujoco.mjtGeom.mjGEOM_HFIELD) + int(mujoco.mjtGeom.mjGEOM_EL
 @functools.cache
 def _table() -> Any:
     """`mjCOLLISIONFUNC`, one row after the other."""
-    return (ctypes.c_void_p * KINDS**2).from_address(library.address("mjCOLLISIONFUNC"))
+    return (ctypes.c_void_p * KINDS**2).from_address(layout.address("mjCOLLISIONFUNC"))
 
 
 def current() -> int:

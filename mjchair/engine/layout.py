@@ -1,6 +1,7 @@
-"""Where the fields of an mjModel, an mjData and a contact lie in memory.
+"""Where the fields of an mjModel, an mjData and a contact lie in memory, and what MuJoCo exports.
 
-In: the name of a struct and of its member. Out: the offset in bytes.
+In: the name of a struct and of its member, or of a function or table. Out: the offset in bytes, or
+the address.
 
 The offsets differ between releases, so none is written down here: they come from MuJoCo's own
 description, `mujoco.introspect`. `check` compares every one that is used with the address or the
@@ -27,6 +28,7 @@ from mjchair.engine.views import (
     members,
 )
 from mjchair.errors import MjchairError
+from mjchair.model import mujoco_library
 from mjchair.model.spec import without_python_callbacks
 
 VALUES: dict[str, Any] = {
@@ -108,6 +110,18 @@ def offset(name: str, member: str) -> int:
         total += getattr(kind, part).offset
         kind = dict(kind._fields_)[part]
     return total
+
+
+def address(name: str) -> int:
+    """Address of a function or table that MuJoCo exports, such as "mj_comVel".
+
+    Raises:
+      LayoutError: the installed MuJoCo does not export it.
+    """
+    library = mujoco_library.shared()
+    if library is not None and hasattr(library, name):
+        return ctypes.addressof(ctypes.c_char.in_dll(library, name))
+    raise LayoutError(f"mujoco {mujoco.__version__} shows no {name}; use mujoco 3.17")
 
 
 _PROBE = """

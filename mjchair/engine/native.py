@@ -18,7 +18,7 @@ from mujoco import mjtStage
 from numba import carray, cfunc, types
 from numba.extending import intrinsic, register_jitable
 
-from mjchair.engine import bias_force, collision, compiling, element, field, layout, library, wheel
+from mjchair.engine import bias_force, collision, compiling, element, field, layout, wheel
 from mjchair.engine.views import (
     CONTACT,
     DataView,
@@ -161,8 +161,8 @@ def _closure(model: Any, data: Any) -> tuple[str, Any, Any, Sizes]:
     """
     layout.check()
     binding.add_symbol(NATIVE, collision.original())
-    binding.add_symbol(COM_VEL, library.address("mj_comVel"))
-    binding.add_symbol(RNE, library.address("mj_rne"))
+    binding.add_symbol(COM_VEL, layout.address("mj_comVel"))
+    binding.add_symbol(RNE, layout.address("mj_rne"))
     sources = fingerprint(*TIRE, *DRIVE, *ENGINE) + mujoco.__version__
     return sources, _offsets("mjModel", model), _offsets("mjData", data), _sizes()
 

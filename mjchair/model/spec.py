@@ -6,7 +6,6 @@ one MjSpec with the chair on the floor of the scene and the tires on its wheels.
 
 from __future__ import annotations
 
-import ctypes
 import functools
 import math
 import os
@@ -27,7 +26,7 @@ from mjchair.drive.attach import attach
 from mjchair.drive.files import read_drive
 from mjchair.drive.quantities import Drive
 from mjchair.errors import MjchairError, nearest
-from mjchair.model import assets, merged_visual_geoms, parts, seating
+from mjchair.model import assets, merged_visual_geoms, mujoco_library, parts, seating
 from mjchair.model.engine_warnings import without_engine_warnings
 from mjchair.model.ground import FLOOR, read_heights, set_heights, set_step
 from mjchair.model.parameters import ChairParameters
@@ -245,8 +244,7 @@ def exact_xml() -> None:
     MuJoCo writes six digits by default, which changes a saved chair slightly. It has this switch
     for its own tests; with a release that lacks the switch, saved models are less exact.
     """
-    library = next(Path(mujoco.__file__).parent.glob("libmujoco*"), None)
-    switch = getattr(ctypes.CDLL(str(library)), "_mjPRIVATE__set_xml_precision", None)
+    switch = getattr(mujoco_library.shared(), "_mjPRIVATE__set_xml_precision", None)
     if switch is not None:
         switch(17)
 

@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from mjchair.diagnosis.data.unit_checks import YAW, Story, at, forward, turning
+from mjchair.diagnosis.data.unit_checks import YAW, Story, at, forward, turning, wheel_pairs
 from mjchair.errors import MjchairError
 from mjchair.measurement.trial import Trial
 from mjchair.model.rolling import RearAxle
@@ -78,14 +78,11 @@ def _check_spin(trial: Trial, axle: RearAxle, seen: tuple[str, Story], wheels: S
     told, other = (np.sqrt(np.mean(s**2)) for s in (wheels.values, at(story, wheels.time)))
     if told < SPUN or other > UNSEEN * told:
         return
-    rolled = forward(trial, axle)
-    for kind in ("speed", "angle"):
-        sides = [rolled[n] for n in (f"{s}_wheel_{kind}" for s in SIDES) if n in rolled]
-        if len(sides) == 2 and _are_opposite((sides[0], sides[1]), 0.0):
-            raise MjchairError(
-                f"{trial.name}: the wheels tell a turn of {told:.2g} rad/s, and {name} sees "
-                f"{other:.2g}: does one of them count down as it rolls forward? Turn its sign"
-            )
+    if any(_are_opposite(pair, 0.0) for pair in wheel_pairs(forward(trial, axle))):
+        raise MjchairError(
+            f"{trial.name}: the wheels tell a turn of {told:.2g} rad/s, and {name} sees "
+            f"{other:.2g}: does one of them count down as it rolls forward? Turn its sign"
+        )
 
 
 def _torque(trial: Trial, axle: RearAxle, mass: float) -> list[str]:

@@ -7,7 +7,7 @@ in two units, or of two lengths of the way; a level accelerometer shows gravity.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import combinations
 from typing import NamedTuple, NoReturn
 
@@ -174,15 +174,19 @@ def turning(trial: Trial, axle: RearAxle) -> dict[str, Story]:
         stories["imu_gyro.z"] = _mean(trial, "imu_gyro.z", unit="deg/s")
     if "heading" in trial.channels:
         stories["heading"] = _rate(trial, "heading")
-    rolled = forward(trial, axle)
+    for left, right in wheel_pairs(forward(trial, axle)):
+        turn = (at(right, left.time) - left.values) / axle.track
+        stories["wheels"] = Story(left.time, turn, "")
+        break
+    return stories
+
+
+def wheel_pairs(rolled: Mapping[str, Story]) -> Iterator[tuple[Story, Story]]:
+    """The left and the right wheel of what `forward` tells: by speeds, then by angles."""
     for kind in ("speed", "angle"):
         names = [f"{side}_wheel_{kind}" for side in ("left", "right")]
         if all(name in rolled for name in names):
-            left, right = (rolled[name] for name in names)
-            turn = (at(right, left.time) - left.values) / axle.track
-            stories["wheels"] = Story(left.time, turn, "")
-            break
-    return stories
+            yield rolled[names[0]], rolled[names[1]]
 
 
 def at(story: Story, time: Array) -> Array:

@@ -16,14 +16,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain.multistart import made_anew
 from mjchair.diagnosis.explain.screening import Base, nuisances_of
 from mjchair.diagnosis.fit.column_ids import ParameterId
-from mjchair.diagnosis.fit.nonlinear import Fitted, refit
+from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.effects.effect import Parameter
-from mjchair.errors import MjchairError
 
 AWAY = 3.0  # standard errors that a size is held beside where it was found, at first
 FARTHER = 2.0  # times that, where this led on
@@ -98,10 +96,8 @@ def _held(base: Base, fitted: Fitted, key: ParameterId, side: float, away: float
         for t in fitted.variant.terms
     )
     start, nuisances = replace(fitted.variant, terms=terms), nuisances_of(base, fitted)
-    try:
-        return Held(key, side, size, refit(base.bench, start, fitted.track, nuisances))
-    except (MjchairError, np.linalg.LinAlgError):
-        return None
+    there = made_anew(base.bench, start, fitted.track, nuisances)
+    return None if there is None else Held(key, side, size, there)
 
 
 def _freed(base: Base, held: Fitted, like: Fitted) -> Fitted | None:
@@ -110,10 +106,7 @@ def _freed(base: Base, held: Fitted, like: Fitted) -> Fitted | None:
         replace(t, free=other.free)
         for t, other in zip(held.variant.terms, like.variant.terms, strict=True)
     )
-    try:
-        return refit(base.bench, replace(held.variant, terms=terms), held.track)
-    except (MjchairError, np.linalg.LinAlgError):
-        return None
+    return made_anew(base.bench, replace(held.variant, terms=terms), held.track)
 
 
 def _with_errors(fitted: Fitted, last: Fitted, seen: Sequence[Held]) -> Fitted:

@@ -152,19 +152,21 @@ def _with_noise_left(base: Base) -> Base:
     then hides what makes it. So where the chair seems to be shaken, the best hypothesis of a chair
     that hardly is stands beside it; it is right where it leaves far less.
     """
-    bench, best = _noise_left(base, base.bench, base.reduced)
+    options = _best_of_sizes(base.reduced, base.starts)
+    bench, best = _noise_left(base, base.bench, base.reduced, options)
     loud = noise_shown.loudness(bench)
     if loud > LOUD:
         hushed = noise_shown.hushed(base.bench)
         reduced = _reduced_anew(_on(base, hushed)).reduced
-        if _may_be_quieter(base, reduced, loud):
-            quieter, other = _noise_left(base, hushed, reduced)
+        options = _best_of_sizes(reduced, base.starts)
+        if _may_be_quieter(base, options, loud):
+            quieter, other = _noise_left(base, hushed, reduced, options)
             if noise_shown.loudness(quieter) < QUIETER * loud:
                 bench, best = quieter, other
     return replace(with_noise(base, bench), best=best)
 
 
-def _may_be_quieter(base: Base, reduced: Reduced, loud: float) -> bool:
+def _may_be_quieter(base: Base, options: Sequence[Hypothesis], loud: float) -> bool:
     """Whether any hypothesis may leave far less noise than there is, by linear algebra.
 
     The fits that tell it for sure take up to a third of a diagnosis, and linear algebra is right
@@ -173,8 +175,7 @@ def _may_be_quieter(base: Base, reduced: Reduced, loud: float) -> bool:
     if loud >= 1.0:
         return True
     return any(
-        noise_shown.loudness(_left_by_columns(base, h)) < PROMISES * loud
-        for h in _best_of_sizes(reduced, base.starts)[:TRIED]
+        noise_shown.loudness(_left_by_columns(base, h)) < PROMISES * loud for h in options[:TRIED]
     )
 
 
@@ -195,16 +196,17 @@ def _on(base: Base, bench: Bench) -> Base:
     return replace(base, bench=bench, around=replace(base.around, bench=bench))
 
 
-def _noise_left(base: Base, bench: Bench, reduced: Reduced) -> tuple[Bench, Found | None]:
+def _noise_left(
+    base: Base, bench: Bench, reduced: Reduced, options: Sequence[Hypothesis]
+) -> tuple[Bench, Found | None]:
     """The bench with the noise that the best hypothesis leaves, and its fit where one was made.
 
     Where it gains enough to be added to an answer, it is fitted first: what linear algebra gets
     wrong of an effect would pass for noise, and noise hides how large the effect is.
 
     Args:
-      bench, reduced: by which the best is found and fitted.
+      bench, reduced: by which the best is found and fitted. options: the best first.
     """
-    options = _best_of_sizes(reduced, base.starts)
     here = base.around.track
     found = _first_that_holds(base, bench, reduced, options)
     own: dict[ColumnId, Column] = {c: base.columns[c] for h in options[:1] for c in h.columns}
