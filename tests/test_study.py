@@ -113,7 +113,7 @@ def test_channels_that_contradict_each_other_are_named(changed, words, tmp_path)
     fails(write(tmp_path, columns), words)
 
 
-@pytest.mark.parametrize("gain", [0.5, 0.7, 1.3, 1.5])
+@pytest.mark.parametrize("gain", [0.5, 0.7, 1.3, 1.5, 2.0])
 @pytest.mark.parametrize("bends", [True, False])
 def test_a_wheel_whose_sensor_has_a_gain_has_its_sign(gain, bends, tmp_path):
     """It tells a turn that no gyroscope sees, and is what the diagnosis is asked about."""

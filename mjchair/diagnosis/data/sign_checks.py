@@ -17,7 +17,8 @@ from mjchair.errors import MjchairError
 from mjchair.measurement.trial import Trial
 from mjchair.model.rolling import RearAxle
 
-LEFT_OVER = 0.4  # of two stories, that their sum is at most where they are each other's opposite
+# two stories are opposite where their sum is smaller than this share of the larger one
+LEFT_OVER = 0.4
 SPUN = 1.0  # rad/s rms by the wheels, which no gyroscope overlooks
 UNSEEN = 0.2  # of that turn, which another channel sees at most where a wheel's sign is wrong
 WORK = 40.0  # J that torques take from a chair, more than it lost: a sign may be wrong (assumption)
