@@ -109,8 +109,10 @@ def test_the_fields_that_are_read_are_the_fields_that_are_checked():
     """What the compiled callbacks read by offset is what `check` compares."""
     read = {name for view in DATA_VIEWS for name in view._fields if not name.startswith("contact_")}
     assert read < set(layout.DATA)
-    of_model = {name for view in MODEL_VIEWS for name in view._fields} - {"timestep"}
-    assert of_model | {"opt.timestep", *native.Sizes._fields[:3]} == set(layout.MODEL)
+    options = {"timestep", "gravity", "disableflags"}
+    of_model = {name for view in MODEL_VIEWS for name in view._fields} - options
+    of_model |= {f"opt.{name}" for name in options}
+    assert of_model | set(native.Sizes._fields[:3]) == set(layout.MODEL)
     contact = {n.removeprefix("contact_") for n in DataView._fields if n.startswith("contact_")}
     assert contact == set(layout.CONTACT_FIELDS)
 

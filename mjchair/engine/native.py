@@ -3,7 +3,7 @@
 In: the offsets of mjchair.engine.layout. Out: the callbacks `act_dyn`, `sensor` and `act_bias`, the
 one that only a moving rider needs, and the collision function of a height field and a tire. They
 make the views of mjchair.engine.views from the addresses that MuJoCo passes, and call the functions
-of wheel.py, element.py, field.py and bias_force.py.
+of wheel.py, element.py, field.py, bias_force.py and mass_centre.py.
 """
 
 from __future__ import annotations
@@ -18,7 +18,16 @@ from mujoco import mjtStage
 from numba import carray, cfunc, types
 from numba.extending import intrinsic, register_jitable
 
-from mjchair.engine import bias_force, collision, compiling, element, field, layout, wheel
+from mjchair.engine import (
+    bias_force,
+    collision,
+    compiling,
+    element,
+    field,
+    layout,
+    mass_centre,
+    wheel,
+)
 from mjchair.engine.views import (
     CONTACT,
     DataView,
@@ -117,6 +126,8 @@ def _reader(view: Any) -> Callable[..., Any]:
 def _expression(name: str, of: Value | Rows) -> str:
     """What reads a field, in compiled code."""
     if isinstance(of, Value):
+        if of.length:
+            return f"carray(_pointer(base + at.{name}, types.{of.kind}), ({of.length},))"
         return f"_load(base + at.{name}, types.{of.kind})"
     if name.startswith(CONTACT):
         first = f"at.{name} // {BYTES[of.kind]}"
@@ -230,6 +241,8 @@ def rider_sensor() -> Any:
         _ = sources
         if stage == STAGE_VEL:
             _extrapolate_bias_force(m, d, om, od, sizes)
+        elif stage == STAGE_ACC:
+            mass_centre.keep(model_view(m, om, sizes), data_view(d, od, sizes))
 
     return sensor
 
@@ -257,7 +270,9 @@ def callbacks() -> tuple[Any, Any, Any]:
     def sensor(m: int, d: int, stage: int) -> None:
         _ = sources
         if stage == STAGE_ACC:
-            wheel.sense(model_view(m, om, sizes), data_view(d, od, sizes))
+            model, data = model_view(m, om, sizes), data_view(d, od, sizes)
+            wheel.sense(model, data)
+            mass_centre.keep(model, data)
         elif stage == STAGE_VEL:
             _extrapolate_bias_force(m, d, om, od, sizes)
 

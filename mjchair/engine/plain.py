@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 from mujoco import mjtStage
 
-from mjchair.engine import bias_force, collision, element, field, layout, wheel
+from mjchair.engine import bias_force, collision, element, field, layout, mass_centre, wheel
 from mjchair.engine.views import data_view, model_view
 from mjchair.tire import block
 
@@ -41,7 +41,9 @@ def sensor(model: mujoco.MjModel, data: mujoco.MjData, stage: int) -> None:
     if stage == mjtStage.mjSTAGE_VEL:
         _extrapolate_bias_force(model, data)
     elif stage == mjtStage.mjSTAGE_ACC:
-        wheel.sense(model_view(model), data_view(data))
+        m, d = model_view(model), data_view(data)
+        wheel.sense(m, d)
+        mass_centre.keep(m, d)
 
 
 def _extrapolate_bias_force(model: mujoco.MjModel, data: mujoco.MjData) -> None:

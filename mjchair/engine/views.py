@@ -24,14 +24,16 @@ IntArray = NDArray[np.int32]
 
 
 class Value(NamedTuple):
-    """A number that lies in the struct itself.
+    """A number that lies in the struct itself, or a few of them.
 
     Attributes:
-      kind: of the number. member: of the struct, where it is called otherwise.
+      kind: of the number. member: of the struct, where it is called otherwise. length: of an
+        array of them, 0: one number.
     """
 
     kind: str
     member: str = ""
+    length: int = 0
 
 
 class Rows(NamedTuple):
@@ -59,6 +61,9 @@ class ModelView(NamedTuple):
     """Arrays of the model, shaped as in the bindings."""
 
     timestep: Annotated[float, Value("float64", "opt.timestep")]
+    gravity: Annotated[Array, Value("float64", "opt.gravity", length=3)]
+    disableflags: Annotated[int, Value("int32", "opt.disableflags")]
+    nbody: Annotated[int, Value("int64")]
     nv: Annotated[int, Value("int64")]
     nsensor: Annotated[int, Value("int64")]
     actuator_trntype: Ints
@@ -68,12 +73,19 @@ class ModelView(NamedTuple):
     actuator_user: Annotated[Array, Rows(width="nuser_actuator")]
     actuator_ctrladr: Ints
     site_bodyid: Ints
+    jnt_type: Ints
     jnt_bodyid: Ints
     jnt_dofadr: Ints
+    dof_jntid: Ints
+    dof_parentid: Ints
     body_geomadr: Ints
     body_geomnum: Ints
     body_rootid: Ints
+    body_weldid: Ints
     body_dofadr: Ints
+    body_dofnum: Ints
+    body_mass: Reals
+    body_subtreemass: Reals
     geom_bodyid: Ints
     geom_size: Triples
     geom_user: Annotated[Array, Rows(width="nuser_geom")]
@@ -91,6 +103,7 @@ class DataView(NamedTuple):
 
     time: Annotated[float, Value("float64")]
     qvel: Reals
+    qacc: Reals
     qacc_warmstart: Reals
     qacc_smooth: Reals
     qfrc_smooth: Reals
@@ -104,6 +117,7 @@ class DataView(NamedTuple):
     geom_xmat: Nines
     site_xpos: Triples
     site_xmat: Nines
+    cdof: Sixes
     cvel: Sixes
     subtree_com: Triples
     sensordata: Reals

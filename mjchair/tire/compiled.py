@@ -22,6 +22,7 @@ ENGINE = (
     "engine/drivetrain.py",
     "engine/element.py",
     "engine/field.py",
+    "engine/mass_centre.py",
     "engine/native.py",
     "engine/views.py",
     "engine/wheel.py",
