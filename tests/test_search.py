@@ -38,9 +38,9 @@ from mjchair.effects import air_drag, wind
 from mjchair.errors import MjchairError
 
 
-def effect(name):
+def effect(name, common=1.0):
     return SimpleNamespace(
-        effect=SimpleNamespace(key=name, common=1.0), free=("size",), group=name, columns=(name,)
+        effect=SimpleNamespace(key=name, common=common), free=("size",), group=name, columns=(name,)
     )
 
 
@@ -64,11 +64,14 @@ def fit(total, *keys, promised=None):
 @pytest.fixture
 def fits(monkeypatch):
     """Fits as `refit` is asked for them; each answers (start, before, nuisances) with a fit."""
-    asked, answers = [], {}
+    asked, answers, reaches = [], {}, []
 
-    def refit(bench, start, before, nuisances=None, rounds=multistart.ROUNDS, part=None):
+    def refit(
+        bench, start, before, nuisances=None, rounds=multistart.ROUNDS, part=None, reach=np.inf
+    ):
         keys = "+".join(sorted(t.effect.key for t in start.terms))
         asked.append((keys, before))
+        reaches.append(reach)
         answer = answers[keys, before]
         if answer is None:
             raise MjchairError("no chair")
@@ -84,7 +87,7 @@ def fits(monkeypatch):
     monkeypatch.setattr(fits_of_hypotheses, "with_form_errors", lambda fitted: fitted)
     monkeypatch.setattr(multistart, "refit", refit)
     monkeypatch.setattr(hypotheses, "terms", terms)
-    return SimpleNamespace(asked=asked, answers=answers)
+    return SimpleNamespace(asked=asked, answers=answers, reaches=reaches)
 
 
 def put(one, **changes):
@@ -125,16 +128,29 @@ def test_two_effects_that_fit_worse_than_one_start_again_from_it(fits):
     assert looking.fit(BOTH).fitted.total == 1110.0
 
 
+def test_a_rival_is_followed_as_far_as_it_can_come_near_the_best(fits):
+    """The best brings 900; a rival that promises 3 times 2 % of that more is out of reach."""
+    fits.answers.update(
+        {("rolling", "as given"): fit(1500.0, "rolling"), ("wind", "as given"): fit(1400.0, "wind")}
+    )
+    looking = searching()
+    best = Tried(ONE, fit(1100.0, "rolling"))
+    looking.fit(ONE)
+    looking.fit(Hypothesis((WIND,), gain=500.0, score=490.0), best)
+    assert fits.reaches[0] == np.inf
+    assert fits.reaches[-1] == pytest.approx(1100.0 + 3.0 * 0.02 * 900.0)
+
+
 @pytest.mark.parametrize("near", [False, True])
 def test_more_effects_are_to_fit_better_than_the_best_part_of_them(fits, monkeypatch, near):
     """A hypothesis without one of these effects may fit worse."""
     asked = {}
 
-    def refit(bench, start, before, nuisances, rounds, part):
+    def refit(bench, start, before, nuisances, rounds, part, reach):
         asked["+".join(sorted(t.effect.key for t in start.terms))] = part and part.total
         return fit(1400.0)
 
-    def refit_near(starts, rounds, part):
+    def refit_near(starts, rounds, part, reach):
         asked["+".join(sorted(s.effect.key for s in starts))] = part and part.total
         return fit(1400.0)
 
@@ -310,6 +326,29 @@ def test_a_rival_takes_the_place_only_once_both_are_made_anew(rival, takes, fits
     assert best.hypothesis is (motor if takes else ONE)
 
 
+@pytest.mark.parametrize(("behind", "takes"), [(3.0, True), (30.0, True), (80.0, False)])
+def test_the_more_common_of_two_effects_comes_first_within_their_form(
+    behind, takes, fits, monkeypatch
+):
+    """Rolling resistance is four times as common as a motor's fault, which is 2.8 of chi2.
+
+    The motor brings 10 000, of which 2 % are the form's: 30 of chi2 count as 1.5 there.
+    """
+    motor = Tried(Hypothesis((MOTOR,), 500.0, 490.0), fit(0.0, "motor"))
+    rolling = Tried(
+        Hypothesis((effect("rolling", common=4.0),), 500.0, 490.0), fit(behind, "rolling")
+    )
+    for name, total in (("motor", 0.0), ("rolling", behind)):
+        fits.answers[(name, f"track of {name}")] = fit(total, name)
+    believe(monkeypatch, lambda _: True)
+    looking = searching()
+    looking.base.plain.total = looking.base.reduced.total = 10_000.0
+    others = {"rolling": [motor], "motor": [rolling]}
+    monkeypatch.setattr(rivals, "rivals_of", lambda _, best: [others[best.hypothesis.keys[0]]])
+    best, _ = rivals.against_rivals(looking, motor)
+    assert best.hypothesis.keys == (("rolling",) if takes else ("motor",))
+
+
 @pytest.mark.parametrize(("total", "both_sides"), [(1099.5, True), (1100.5, True), (1102.0, False)])
 def test_both_sides_are_free_where_the_data_leave_open_which_it_is(total, both_sides, monkeypatch):
     """Of two wheels that differ by 1 mm, a rival came in by the right one alone."""
@@ -359,7 +398,7 @@ def test_a_second_effect_is_weighed_around_the_fit_of_the_first(fits, monkeypatc
         }
     )
     both = fit(1110.0, "rolling", "motor")
-    near = SimpleNamespace(refit=lambda starts, rounds, most: both, weigh=lambda starts: ONE)
+    near = SimpleNamespace(refit=lambda starts, rounds, most, reach: both, weigh=lambda starts: ONE)
     monkeypatch.setattr(fits_of_hypotheses, "near_fit", lambda base, found: near)
     monkeypatch.setattr(hypotheses, "singles", lambda *_: [ONE])
     monkeypatch.setattr(hypotheses, "pairs", lambda *_: [])

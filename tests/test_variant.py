@@ -108,22 +108,37 @@ def test_a_wind_is_there_though_its_drag_area_is_not_known(speed, there):
     assert rules.is_there(sigmas=sigmas) == there
 
 
-@pytest.mark.parametrize(("most", "looked"), [(90.0, 1 + nonlinear.FEW), (np.inf, 13)])
-def test_a_fit_that_stays_worse_than_a_part_of_it_is_not_followed(most, looked, monkeypatch):
-    """It comes down by 1 in every round, from 1000."""
+@pytest.fixture
+def descent(monkeypatch):
+    """A fit that comes down by 1 in every round, from 1000, and promises 500 all the time."""
     totals = iter(range(1000, 0, -1))
 
     def placed(*_):
-        total = next(totals)
-        return SimpleNamespace(total=float(total), promised=0.0, track=None, std={}, variant=None)
+        total = float(next(totals))
+        return SimpleNamespace(total=total, promised=500.0, track=None, std={}, variant=None)
 
     monkeypatch.setattr(nonlinear, "_placed", placed)
     monkeypatch.setattr(nonlinear, "_around", lambda _, here, *__: here)
     monkeypatch.setattr(nonlinear, "_after_linear_step", lambda *_: None)
     monkeypatch.setattr(nonlinear, "_between", lambda *_: None)
     monkeypatch.setattr(nonlinear, "_nearer", lambda _, here, *__: here)
+
+
+@pytest.mark.parametrize(("most", "looked"), [(90.0, 1 + nonlinear.FEW), (np.inf, 13)])
+def test_a_fit_that_stays_worse_than_a_part_of_it_is_not_followed(most, looked, descent):
     bench, part = SimpleNamespace(simulator=None), SimpleNamespace(total=most)
     found = nonlinear.refit(bench, None, None, {}, part=part)
+    assert found.total == 1001.0 - looked
+
+
+@pytest.mark.parametrize(
+    ("reach", "most", "looked"),
+    [(499.0, np.inf, 2), (501.0, np.inf, 13), (499.0, 90.0, 1 + nonlinear.FEW)],
+)
+def test_a_fit_that_promises_too_little_ends_after_a_round(reach, most, looked, descent):
+    """One that is still worse than a part of it has a promise that says nothing."""
+    bench, part = SimpleNamespace(simulator=None), SimpleNamespace(total=most)
+    found = nonlinear.refit(bench, None, None, {}, part=part, reach=reach)
     assert found.total == 1001.0 - looked
 
 

@@ -31,7 +31,7 @@ RIVAL_CHI2 = 10.0  # a rival this near, in chi2 with its penalty, is not ruled o
 SIZE_BY_FORM = 0.01  # of an effect's size: the form of no effect tells it better (assumption)
 FORM = 0.02  # of the gain: the form of no effect is better known (assumption)
 REPLACES = 0.5  # of what an effect brings: what misses more of it does not stand in its place
-FAR_BEHIND = 3.0  # times what keeps a rival: a fit that promises no more is not started again
+FAR_BEHIND = 3.0  # times what keeps a rival: a fit that promises no more is not followed
 RIVAL_ERRORS = 2.0  # nor one this near in paired standard errors over windows
 # how hypotheses grow and shrink
 MOST = 3  # effects that are added
@@ -451,18 +451,29 @@ def reaches(*, total: float, promised: float, gain: float) -> bool:
     return total - promised <= not_ruled_out(gain=gain)
 
 
-def out_of_reach(*, promised: float, best: float, gain: float) -> bool:
-    """Whether a fit is not worth starting again: even what it promises is far behind.
+def reach(*, best: float, gain: float) -> float:
+    """Chi2 beyond which what a fit promises is too far behind to follow it or to start it again.
 
     Args:
-      promised, best: chi2 that the fit promises, and of the best fit. gain: that the best brings.
+      best: chi2 of the best fit. gain: that it brings.
     """
-    return promised - best > FAR_BEHIND * not_ruled_out(gain=gain)
+    return best + FAR_BEHIND * not_ruled_out(gain=gain)
 
 
 def not_ruled_out(*, gain: float) -> float:
     """Chi2 by which a fit may be worse and yet as good as another that brings `gain`."""
     return max(RIVAL_CHI2, FORM * gain)
+
+
+def counts(by: float, *, gain: float) -> float:
+    """Chi2 by which one fit is better than another, as far as the form of effects lets it count.
+
+    What would just not rule out a rival counts as RIVAL_CHI2, however much the effect brings.
+
+    Args:
+      gain: chi2 that the effect brings in whose place the other stands.
+    """
+    return by * RIVAL_CHI2 / not_ruled_out(gain=gain)
 
 
 def is_far(by: float) -> bool:

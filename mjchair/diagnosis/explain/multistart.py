@@ -140,12 +140,12 @@ class MultiStart:
         Raises:
           MjchairError: there no chair can be.
         """
-        base = self.base
+        base, reach = self.base, self._reach()
         if self.near is not None:
-            return self.near.refit(self.hypothesis.starts, rounds, self.part)
+            return self.near.refit(self.hypothesis.starts, rounds, self.part, reach)
         terms = hypotheses.terms(base.reduced, self.hypothesis, share)
         start = replace(base.around.variant, terms=terms)
-        return refit(base.bench, start, base.around.track, base.nuisances, rounds, self.part)
+        return refit(base.bench, start, base.around.track, base.nuisances, rounds, self.part, reach)
 
     def _terms(self) -> tuple[Term, ...]:
         """The effects with the values that linear algebra promises."""
@@ -155,11 +155,13 @@ class MultiStart:
 
     def _is_behind(self, fitted: Fitted) -> bool:
         """Whether a fit ends, by its own promise, too far behind the best to come near it."""
-        return self.best is not None and rules.out_of_reach(
-            promised=fitted.promised,
-            best=self.best.total,
-            gain=gain(self.base, self.best),
-        )
+        return fitted.promised > self._reach()
+
+    def _reach(self) -> float:
+        """Chi2 that a fit must promise to come near the best."""
+        if self.best is None:
+            return np.inf
+        return rules.reach(best=self.best.total, gain=gain(self.base, self.best))
 
     def _around_terms(self, fitted: Fitted) -> Fitted:
         """The fit from the effects that were reached, what is roughly known as given; the better.

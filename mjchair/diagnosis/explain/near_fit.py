@@ -57,12 +57,14 @@ class NearFit:
             at += count
         return tuple(out)
 
-    def refit(self, starts: Sequence[Start], rounds: int, part: Fitted | None) -> Fitted:
-        """The nonlinear fit that begins there; `rounds` and `part` as `refit` takes them."""
+    def refit(
+        self, starts: Sequence[Start], rounds: int, part: Fitted | None, reach: float
+    ) -> Fitted:
+        """The nonlinear fit that begins there; what is given with `starts` as `refit` takes it."""
         near = self.found.fitted
         start = replace(near.variant, terms=self.terms(starts))
         known = nuisances_of(self.base, near)
-        return refit(self.base.bench, start, near.track, known, rounds, part)
+        return refit(self.base.bench, start, near.track, known, rounds, part, reach)
 
     def physical(self, starts: Sequence[Start]) -> bool:
         """Whether what is new lies on the allowed side of its parameters, not far beyond them."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -23,17 +24,18 @@ from mjchair.diagnosis.explain.shortlist import with_one_more
 
 REFITTED = 5  # rivals of an effect that is alone
 BESIDE = 3  # rivals of each effect that has others beside it
+NEAR = rules.RIVAL_CHI2  # chi2 behind, at which columns that are made anew may bring a rival first
 SWAPS = 2  # times that a rival takes the place of the chosen hypothesis
 
 
 def against_rivals(fits: Fits, chosen: Tried) -> tuple[Tried, list[list[Tried]]]:
     """The best of the chosen hypothesis and what could stand in its places, with its rivals.
 
-    Linear algebra chose; a rival that fits better once both are made anew takes the place.
+    Linear algebra chose; a rival that is better once both are made anew takes the place.
     """
     rivals = rivals_of(fits, chosen)
     for _ in range(SWAPS):
-        better = _better_rival(fits, chosen, [r for group in rivals for r in group])
+        better = _better_rival(fits, chosen, rivals)
         if better is None:
             break
         chosen = without_needless(fits, better)
@@ -41,21 +43,28 @@ def against_rivals(fits: Fits, chosen: Tried) -> tuple[Tried, list[list[Tried]]]
     return chosen, rivals
 
 
-def _better_rival(fits: Fits, chosen: Tried, rivals: Sequence[Tried]) -> Tried | None:
+def _better_rival(fits: Fits, chosen: Tried, rivals: Sequence[Sequence[Tried]]) -> Tried | None:
     """The best of the rivals that are better than the choice; None: none is.
 
     Columns that were made without the effects are wrong by some chi2, more for one hypothesis
     than for another, so of those that are near everything is made anew.
+
+    Args:
+      rivals: of every effect of the choice.
     """
 
-    def price_anew(tried: Tried) -> float:
-        return replace(tried, fitted=fits.anew(tried)).price
+    def ahead(rival: Tried, own: float, anew: bool) -> float:
+        """Chi2 by which a rival is better, what the form of effects leaves open taken off."""
+        mine, theirs = (fits.anew(t) if anew else t.fitted for t in (chosen, rival))
+        by_data = rules.counts(mine.total - theirs.total, gain=own)
+        return by_data + chosen.hypothesis.penalty - rival.hypothesis.penalty
 
-    near = [r for r in rivals if believable(r.fitted) and r.price < chosen.price + rules.RIVAL_CHI2]
-    if not near:
-        return None
-    best = min(near, key=price_anew)
-    return best if price_anew(best) < price_anew(chosen) else None
+    own = own_gains(fits, chosen)
+    pairs = [(r, g) for group, g in zip(rivals, own, strict=True) for r in group]
+    near = [(r, g) for r, g in pairs if believable(r.fitted) and ahead(r, g, False) > -NEAR]
+    found = [(ahead(r, g, True), r) for r, g in near]
+    best, rival = max(found, key=itemgetter(0), default=(0.0, None))
+    return rival if best > 0.0 else None
 
 
 def rivals_of(fits: Fits, chosen: Tried) -> list[list[Tried]]:

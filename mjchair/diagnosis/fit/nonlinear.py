@@ -89,6 +89,7 @@ def refit(
     nuisances: dict[ColumnId, Column] | None = None,
     rounds: int = ROUNDS,
     part: Fitted | None = None,
+    reach: float = np.inf,
 ) -> Fitted:
     """Nonlinear fit of nuisances and effects within bounds: Gauss-Newton with a line search.
 
@@ -100,6 +101,7 @@ def refit(
       part: a fit of some of the effects; None: none is known. With more effects nothing fits worse,
         so a start that does is moved towards it, and a fit that still does after a few rounds has
         gone astray.
+      reach: chi2 that must be promised after a round; a fit that promises more ends there.
 
     Raises:
       MjchairError: `start` is no chair that can be: it does not compile, or its simulation fails.
@@ -120,7 +122,8 @@ def refit(
     for k in range(rounds):
         # columns that were made anew are followed once, however little they promise
         done = best.total - best.promised < DONE and not (anew and k == 0)
-        if done or (k >= FEW and best.total > most):
+        behind = k > 0 and best.promised > reach and best.total <= most
+        if done or behind or (k >= FEW and best.total > most):
             break
         try:
             here = _placed(bench, variant, best.track, nuisances)
