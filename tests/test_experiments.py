@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -211,8 +212,19 @@ def test_a_rehearsed_spin_ends_like_one_of_smaller_steps(one_way):
         data = start(model, here.initial(spin))
         for _ in range(6000):
             mujoco.mj_step(model, data)
-    (trace,) = made._open_loop(chair, made.first)
+    (trace,) = (o.trace for o in made._open_loop(chair, made.first))
     assert trace["qpos"][-1][casters] == pytest.approx(data.qpos[casters], abs=0.03)
+
+
+def test_a_rehearsal_counts_the_turns_of_a_heading_over_its_windows(one_way):
+    bench = one_way[2]
+    turn = replace(BY_NAME["coast in a left turn"], turned=2.6)  # from 2.9 rad on, over pi
+    made = Rehearsal(bench, setting(bench.simulator.study), [turn], Version(Variant(())))
+    heading = list(made.simulator.channels).index("heading")
+    ends = [predicted[[0, -1], heading] for predicted in made.track.predicted]
+    assert len(ends) > 2 and ends[0][0] < np.pi < ends[-1][1]
+    for (_, before), (after, _) in pairwise(ends):
+        assert after == pytest.approx(before, abs=0.2)
 
 
 def test_a_chair_that_is_shaken_promises_less(one_way, against_slope):

@@ -27,7 +27,7 @@ from mjchair.diagnosis.replay.chair_state import SLOW, STEPS, State
 from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.pulses import Pulse, pulse_answers, pulses
 from mjchair.diagnosis.replay.sensor_errors import SensorErrors
-from mjchair.diagnosis.replay.simulator import Job, WindowSimulator
+from mjchair.diagnosis.replay.simulator import Job, Outcome, WindowSimulator
 from mjchair.diagnosis.replay.window_states import Track
 from mjchair.effects.effect import SensorError
 from mjchair.engine.install import installed
@@ -107,16 +107,20 @@ class Rehearsal:
         self.known: dict[object, mujoco.MjModel] = {}
         self._plan(bench, setting)
         self.first = self._starts(chair)
-        traces = self._open_loop(chair, self.first)
-        again = self._nudged(chair)
+        made = self._open_loop(chair, self.first)
+        traces, again = [o.trace for o in made], self._nudged(chair)
         whole = [i for i in range(len(traces)) if self._possible(traces[i], again[i])] or [0]
         if len(whole) < len(traces):
             self.manoeuvres = [self.manoeuvres[i] for i in whole]
             self.first = [self.first[i] for i in whole]
             self._plan(bench, setting)
-            traces = [traces[i] for i in whole]
+            made = [made[i] for i in whole]
+        self.simulator.turned = [
+            {i: o.predicted[:, i] for i in turned}
+            for o, turned in zip(made, self.simulator.turned, strict=True)
+        ]
         self.whitener = Whitener(self.simulator, bench.noise)
-        self.track = self._track(chair, traces)
+        self.track = self._track(chair, [o.trace for o in made])
         self.process = None if bench.process is None else self._shaken(bench, bench.process)
 
     def _plan(self, bench: Bench, setting: Setting) -> None:
@@ -147,16 +151,17 @@ class Rehearsal:
                 out.append(self.simulator.carrier.back(model, trace, 0))
         return out
 
-    def _open_loop(self, chair: Version, states: Sequence[State]) -> list[dict[str, Array]]:
-        """Traces of whole runs."""
+    def _open_loop(self, chair: Version, states: Sequence[State]) -> list[Outcome]:
+        """Whole runs, with their traces."""
         windows = self.longer.windows
         jobs = [Job(self.model(chair), w, s) for w, s in zip(windows, states, strict=True)]
-        return [o.trace for o in self.longer.run(jobs, trace=True)]
+        return self.longer.run(jobs, trace=True)
 
     def _nudged(self, chair: Version) -> list[dict[str, Array]]:
         """Traces of whole runs that start a little turning."""
         step = NUDGE * np.eye(len(SLOW))[SLOW.index("yaw_rate")]
-        return self._open_loop(chair, [self.simulator.chair.moved(s, step) for s in self.first])
+        states = [self.simulator.chair.moved(s, step) for s in self.first]
+        return [o.trace for o in self._open_loop(chair, states)]
 
     def _possible(self, trace: dict[str, Array], nudged: dict[str, Array]) -> bool:
         """Whether a chair stays upright, goes no faster than a chair, and would do it again."""

@@ -17,6 +17,7 @@ from mjchair.model.wheels import base_name
 from mjchair.simulation.channels import channels
 
 Array = NDArray[np.float64]
+TURN = 2.0 * np.pi
 
 
 def places(model: mujoco.MjModel, wanted: Sequence[str]) -> list[int]:
@@ -49,10 +50,29 @@ def sampled(sensed: Array, step: float, time: Array, names: Sequence[str]) -> Ar
     return np.asarray((1.0 - share) * sensed[low] + share * sensed[low + 1])
 
 
+def course(values: Array) -> Array:
+    """An angle that wraps, (n,) with NaN where it was not measured, counted on over whole turns."""
+    out, known = np.full(values.size, np.nan), np.isfinite(values)
+    out[known] = np.unwrap(values[known])
+    return out
+
+
+def beside(predicted: Array, measured: Array) -> Array:
+    """A predicted angle, by whole turns moved to where the measured one begins; both (rows,).
+
+    A gain of a heading shows by how far the chair has turned, so the turns must be counted alike.
+    """
+    known = np.flatnonzero(np.isfinite(measured))
+    if not known.size:
+        return predicted
+    apart = measured[known[0]] - predicted[known[0]]
+    return np.asarray(predicted + TURN * np.round(apart / TURN))
+
+
 def residual(measured: Array, predicted: Array, names: Sequence[str]) -> Array:
     """Measured minus predicted (rows, channels); angles that wrap stay within half a turn."""
     out = measured - predicted
     for i, name in enumerate(names):
         if sensor(name).wraps:
-            out[:, i] = (out[:, i] + np.pi) % (2.0 * np.pi) - np.pi
+            out[:, i] = (out[:, i] + np.pi) % TURN - np.pi
     return out

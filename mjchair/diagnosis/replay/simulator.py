@@ -21,10 +21,11 @@ from mjchair.diagnosis.replay import strokes
 from mjchair.diagnosis.replay.cache import Part, Store, digest
 from mjchair.diagnosis.replay.chair_state import Chair, State
 from mjchair.diagnosis.replay.measured_motion import motions
-from mjchair.diagnosis.replay.sampling import places, sampled
+from mjchair.diagnosis.replay.sampling import beside, course, places, sampled
 from mjchair.diagnosis.replay.state_transfer import StateCarrier
 from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
+from mjchair.measurement.sensors import sensor
 from mjchair.model import moving_share
 from mjchair.model.load import loaded
 from mjchair.model.visual_geoms import without_visual_geoms
@@ -68,6 +69,7 @@ class WindowSimulator:
     Attributes:
       study, channels, windows: what is simulated. step: of the simulation, s.
       rolls: of every window, whether a channel shows that the chair rolls as it begins.
+      turned: of every run, the measured angles that wrap, by channel, with their turns counted.
     """
 
     def __init__(
@@ -94,6 +96,7 @@ class WindowSimulator:
         self.coarse = self._coarse_step()
         self._places: dict[int, list[int]] = {}
         self.motions = [motions(run) | strokes.courses(run) for run in study.runs]
+        self.turned = [self._turned(run) for run in study.runs]
         self.carrier = StateCarrier(self.base, self.chair)
         self.studied = digest(part for run in study.runs for part in _given(run))
 
@@ -105,6 +108,15 @@ class WindowSimulator:
             for k, rolls in zip(mine, shown, strict=True):
                 out[k] = bool(rolls)
         return out
+
+    def _turned(self, run: Run) -> dict[int, Array]:
+        """The angles of a run that wrap, by place among the channels, with their turns counted."""
+        known = run.trial.channels
+        return {
+            i: course(known[c])
+            for i, c in enumerate(self.channels)
+            if c in known and sensor(c).wraps
+        }
 
     def _coarse_step(self) -> float:
         """Twice the step where the tires allow it: enough for differences of two simulations."""
@@ -314,11 +326,14 @@ class WindowSimulator:
             self._places[model.nsensordata] = places(model, self.channels)
         values = sensed[:, self._places[model.nsensordata]]
         time = self.study.runs[window.run].trial.time[window.rows] - window.start
-        return sampled(values, model.opt.timestep, time, self.channels)
+        out = sampled(values, model.opt.timestep, time, self.channels)
+        for i, angle in self.turned[window.run].items():
+            out[:, i] = beside(out[:, i], angle[window.rows])
+        return out
 
 
 def _given(run: Run) -> Iterator[Part]:
-    """What of a run its simulation follows from: load, times, inputs, the rider's motion."""
+    """What of a run its predictions follow from: load, times, inputs, motion, counted turns."""
     trial = run.trial
     yield repr(run.load)
     yield trial.time
@@ -327,6 +342,10 @@ def _given(run: Run) -> Iterator[Part]:
         yield "hold" if trial.inputs.hold else "straight"
     for columns in (trial.inputs.controls if trial.inputs is not None else {}, trial.other):
         for name, values in columns.items():
+            yield name
+            yield values
+    for name, values in trial.channels.items():
+        if sensor(name).wraps:
             yield name
             yield values
 
