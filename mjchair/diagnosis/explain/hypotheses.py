@@ -63,9 +63,14 @@ class Hypothesis:
         return 2.0 * sum(math.log(s.effect.common) for s in self.starts)
 
     @property
+    def cost(self) -> float:
+        """Chi2 that the parameters cost."""
+        return PENALTY * self.free
+
+    @property
     def penalty(self) -> float:
         """Chi2 that the parameters cost, less for effects that are common."""
-        return PENALTY * self.free - self.prior
+        return self.cost - self.prior
 
     @property
     def free(self) -> int:

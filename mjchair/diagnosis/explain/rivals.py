@@ -54,10 +54,13 @@ def _better_rival(fits: Fits, chosen: Tried, rivals: Sequence[Sequence[Tried]]) 
     """
 
     def ahead(rival: Tried, own: float, anew: bool) -> float:
-        """Chi2 by which a rival is better, what the form of effects leaves open taken off."""
-        mine, theirs = (fits.anew(t) if anew else t.fitted for t in (chosen, rival))
-        by_data = rules.counts(mine.total - theirs.total, gain=own)
-        return by_data + chosen.hypothesis.penalty - rival.hypothesis.penalty
+        """Chi2 by which a rival is better: as far as the form of effects lets the data count, and
+        by how much more common it is."""
+        mine, theirs = (
+            (fits.anew(t) if anew else t.fitted).total + t.hypothesis.cost for t in (chosen, rival)
+        )
+        more_common = rival.hypothesis.prior - chosen.hypothesis.prior
+        return rules.counts(mine - theirs, gain=own) + more_common
 
     own = own_gains(fits, chosen)
     pairs = [(r, g) for group, g in zip(rivals, own, strict=True) for r in group]
