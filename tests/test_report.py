@@ -187,6 +187,30 @@ def test_a_named_effect_comes_with_value_and_uncertainty():
     assert said == "The chair lacks **rolling resistance** (coefficient 0.01460 ± 0.00040)."
 
 
+@pytest.mark.parametrize(
+    ("name", "parameter", "value", "unit", "said"),
+    [
+        ("sensor_scale", "scale", 0.0025, "1", "shows 0.25 % too much (**sensor scale**: scale"),
+        ("sensor_bias", "bias", -0.02, "rad", "shows 0.02 rad too little (**sensor bias**: bias"),
+        ("sensor_delay", "delay", 0.03, "s", "comes 0.03 s late (**sensor delay**: delay"),
+    ],
+)
+def test_a_sensor_at_fault_is_no_lack_of_the_chair(name, parameter, value, unit, said):
+    fault = NamedEffect(
+        name=name,
+        parameters={parameter: Estimate(value=value, std=0.1 * abs(value), unit=unit)},
+        closure=1.0,
+        channel="heading",
+    )
+    alone = Diagnosis(verdict=Verdict.NAMED, effects=[fault])
+    assert words.missing(alone).startswith(f"The sensor `heading` {said}")
+    assert words.next_step(alone).endswith("the chair lacks nothing.")
+    both = Diagnosis(verdict=Verdict.NAMED, effects=[fault, ROLLING])
+    assert "The chair lacks **rolling resistance** (" in words.missing(both)
+    assert f"), and the sensor `heading` {said}" in words.missing(both)
+    assert "model.xml" in words.next_step(both)
+
+
 def test_rivals_are_in_the_first_sentence():
     sets = [["floor_slope", "rolling_resistance"]]
     said = words.missing(Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets))
@@ -203,13 +227,13 @@ def test_what_is_in_every_explanation_is_said_before_what_is_open():
     )
     assert words.certain(found) == [BIAS]
     said = words.missing(found)
-    assert said.startswith("The chair lacks **sensor bias** on imu_gyro.z")
-    assert "and besides **rolling resistance** or **toe**, which these runs cannot" in said
+    assert said.startswith("The sensor `imu_gyro.z` shows 0.1")
+    assert "Besides, what is missing is **rolling resistance** or **toe**, which these" in said
     assert said.endswith(
-        "the corrected chair has **rolling resistance** (coefficient 0.01460 ± 0.00040)."
+        "the correction has **rolling resistance** (coefficient 0.01460 ± 0.00040)."
     )
     thin = dataclasses.replace(found, effects=[BIAS], alternatives=[])
-    assert "the corrected chair has **sensor bias** on imu_gyro.z (bias 0.1" in words.missing(thin)
+    assert "the correction has **sensor bias** on imu_gyro.z (bias 0.1" in words.missing(thin)
     doubted = dataclasses.replace(found, probability={"outside": 0.5, f"toe+{BIAS.key}": 0.5})
     assert words.certain(doubted) == []
 

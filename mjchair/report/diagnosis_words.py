@@ -7,7 +7,7 @@ is typed, for the page to show; nothing here is HTML.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from mjchair.diagnosis.explain.column_ids import Quantity
@@ -33,11 +33,10 @@ UNSURE = 0.005  # probabilities below this are not named
 
 def missing(diagnosis: Diagnosis) -> str:
     """What is missing, in one sentence."""
-    effects = " and ".join(effect_words(e) for e in diagnosis.effects)
     if diagnosis.verdict == Verdict.NONE:
         return nothing_missing(diagnosis) + turn_words(diagnosis)
     if diagnosis.verdict == Verdict.NAMED:
-        return remainder_words(diagnosis) + f"The chair lacks {effects}."
+        return remainder_words(diagnosis) + _capital(found_words(diagnosis.effects)) + "."
     if diagnosis.verdict == Verdict.AMBIGUOUS:
         return remainder_words(diagnosis) + _undecided(diagnosis)
     return "A force is missing that no effect of the library explains, so none is named."
@@ -53,11 +52,39 @@ def _undecided(diagnosis: Diagnosis) -> str:
     )
     known = certain(diagnosis)
     others = [e for e in diagnosis.effects if e not in known]
-    chosen = " and ".join(map(effect_words, others or known))
+    chosen = "the correction has " + " and ".join(map(effect_words, others or known))
     if not known or not others:
-        return f"The chair lacks {doubt}; the corrected chair has {chosen}."
-    first = " and ".join(map(effect_words, known))
-    return f"The chair lacks {first}, and besides {doubt}; the corrected chair has {chosen}."
+        return f"What is missing is {doubt}; {chosen}."
+    return f"{_capital(found_words(known))}. Besides, what is missing is {doubt}; {chosen}."
+
+
+def found_words(effects: Sequence[NamedEffect]) -> str:
+    """What is missing on the chair, and what its sensors show wrongly, as one clause."""
+    lacks = " and ".join(effect_words(e) for e in effects if e.channel is None)
+    chair = [f"the chair lacks {lacks}"] if lacks else []
+    return ", and ".join(chair + [sensor_words(e) for e in effects if e.channel is not None])
+
+
+def sensor_words(effect: NamedEffect) -> str:
+    """What a sensor at fault shows, as a clause."""
+    number = next(iter(effect.parameters.values()))
+    if effect.name == "sensor_delay":
+        shows = f"comes {size(number.value)} s late"
+    else:
+        much = "much" if number.value > 0.0 else "little"
+        by = (
+            f"{size(100.0 * abs(number.value))} %"
+            if effect.name == "sensor_scale"
+            else f"{size(abs(number.value))} {number.unit}"
+        )
+        shows = f"shows {by} too {much}"
+    what = ", ".join(_parameters(effect))
+    return f"the sensor `{effect.channel}` {shows} ({bold(effect.name)}: {what})"
+
+
+def _capital(text: str) -> str:
+    """The text as the beginning of a sentence."""
+    return text[:1].upper() + text[1:]
 
 
 def certain(diagnosis: Diagnosis) -> list[NamedEffect]:
@@ -227,6 +254,8 @@ def next_step(diagnosis: Diagnosis) -> str:
     if not diagnosis.next_experiment:
         if diagnosis.verdict == Verdict.NONE:
             return "Nothing is needed; use the chair as it is."
+        if all(e.channel is not None for e in diagnosis.effects):
+            return "These data decide: correct what the sensor shows; the chair lacks nothing."
         return "These data decide; use the corrected chair (model.xml)."
     return first_sentence(diagnosis.next_experiment)
 
