@@ -111,7 +111,7 @@ def build(
       only: windows that are asked about; the others tell nothing. None: all.
 
     Returns:
-      The system without cells.
+      The system without cells; that of some windows `only` has no slow part either.
     """
     ids = list(columns)
     p, count = len(ids), len(simulator.windows)
@@ -126,7 +126,8 @@ def build(
         window = eliminate_window(simulator, track, whitener, i, miss, stacked, process)
         G[i], b[i], c[i] = window.G, window.b, window.chi2
         raw += (window.J * window.J).sum(axis=0)
-        slow[i] = slow_components(window, nuisance, whitener.slow(i, BAND))
+        if only is None:
+            slow[i] = slow_components(window, nuisance, whitener.slow(i, BAND))
     hidden = taken_whole(G.sum(axis=0).diagonal(), raw)
     hidden[:nuisance] = False
     G[:, hidden, :], G[:, :, hidden], b[:, hidden] = 0.0, 0.0, 0.0
