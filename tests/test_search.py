@@ -65,6 +65,7 @@ def fit(total, *keys, promised=None):
 def fits(monkeypatch):
     """Fits as `refit` is asked for them; each answers (start, before, nuisances) with a fit."""
     asked, answers, reaches = [], {}, []
+    found = SimpleNamespace(asked=asked, answers=answers, reaches=reaches, most=1.0)
 
     def refit(
         bench, start, before, nuisances=None, rounds=multistart.ROUNDS, part=None, reach=np.inf
@@ -78,7 +79,9 @@ def fits(monkeypatch):
         return answer
 
     def terms(reduced, hypothesis, share=1.0):
-        return tuple(Term(s.effect, {"size": 1.0}, ()) for s in hypothesis.starts)
+        return tuple(
+            Term(s.effect, {"size": min(share, found.most)}, ()) for s in hypothesis.starts
+        )
 
     monkeypatch.setattr(rules, "NOTHING", 0.0)  # no effect is so small that columns hold
     monkeypatch.setattr(whole_sizes, "fits", lambda *_: ())
@@ -87,7 +90,7 @@ def fits(monkeypatch):
     monkeypatch.setattr(fits_of_hypotheses, "with_form_errors", lambda fitted: fitted)
     monkeypatch.setattr(multistart, "refit", refit)
     monkeypatch.setattr(hypotheses, "terms", terms)
-    return SimpleNamespace(asked=asked, answers=answers, reaches=reaches)
+    return found
 
 
 def put(one, **changes):
@@ -176,6 +179,14 @@ def test_what_fits_worse_than_nothing_is_begun_again_only_where_it_may_be_best(
     assert looking.fit(Hypothesis((WIND,), gain=900.0, score=880.0), best) is None
     assert fewest <= len(fits.asked) <= most
     assert looking.dropped == ["wind fits worse than nothing and is left out"]
+
+
+def test_shares_that_end_at_the_same_bound_are_one_start(fits):
+    """Of a size of at most 0.5, shares of 0.375, 0.25 and 0.125 are new, and the best is fitted."""
+    fits.answers["wind", "as given"] = fit(2010.0, "wind", promised=2005.0)
+    fits.most = 0.5
+    searching().fit(Hypothesis((WIND,), gain=900.0, score=880.0))
+    assert len(fits.asked) == 1 + 3 + 1
 
 
 def test_a_fit_that_went_astray_begins_once_more_near_no_effect():

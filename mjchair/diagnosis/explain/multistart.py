@@ -6,6 +6,7 @@ best fit, or None where this chair cannot have these effects.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from operator import attrgetter
 
@@ -108,16 +109,26 @@ class MultiStart:
         return min(fits, key=attrgetter("total"), default=None)
 
     def _best_share(self) -> float | None:
-        """The share of the linear coefficients that fits best as it stands; None: none can be."""
+        """The share of the linear coefficients that fits best as it stands; None: none can be.
+
+        Shares that end at the same bounds are one start, and the whole is known already.
+        """
         if len(self.hypothesis.starts) > 1:  # the simulations are worth it for a single effect only
             return 0.5
-        totals = {}
+        totals, known = {}, [self._values(1.0)]
         for share in SHARES:
+            if self._values(share) in known:
+                continue
+            known.append(self._values(share))
             try:
                 totals[share] = self._refit(share, rounds=0).total
             except (MjchairError, np.linalg.LinAlgError):
                 continue
         return min(totals, key=totals.__getitem__, default=None)
+
+    def _values(self, share: float) -> list[Mapping[str, float]]:
+        """The effects' parameters at a share of the linear fit's coefficients."""
+        return [t.values for t in hypotheses.terms(self.base.reduced, self.hypothesis, share)]
 
     def _from(self, share: float) -> Fitted | None:
         """The fit that begins at a share of the linear fit's coefficients; None: none can be."""
