@@ -245,7 +245,7 @@ def test_no_name_where_none_is_named(verdict):
 
 def test_words_from_outside_are_escaped():
     html = page(Diagnosis(verdict=Verdict.NAMED, effects=[BIAS]), {}, "<i>title</i> & more")
-    assert "&lt;m/s&gt;" in html and "on imu_gyro.z" in html
+    assert "&lt;m/s&gt;" in html and "sensor <code>imu_gyro.z</code> shows" in html
     assert "<m/s>" not in html and "<i>" not in html
     assert "&lt;i&gt;title&lt;/i&gt; &amp; more" in html
 
