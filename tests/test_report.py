@@ -203,11 +203,11 @@ def test_a_sensor_at_fault_is_no_lack_of_the_chair(name, parameter, value, unit,
         channel="heading",
     )
     alone = Diagnosis(verdict=Verdict.NAMED, effects=[fault])
-    assert words.missing(alone).startswith(f"The sensor `heading` {said}")
+    assert words.missing(alone).startswith(f"The sensor of heading {said}")
     assert words.next_step(alone).endswith("the chair lacks nothing.")
     both = Diagnosis(verdict=Verdict.NAMED, effects=[fault, ROLLING])
     assert "The chair lacks **rolling resistance** (" in words.missing(both)
-    assert f"), and the sensor `heading` {said}" in words.missing(both)
+    assert f"), and the sensor of heading {said}" in words.missing(both)
     assert "model.xml" in words.next_step(both)
 
 
@@ -227,7 +227,7 @@ def test_what_is_in_every_explanation_is_said_before_what_is_open():
     )
     assert words.certain(found) == [BIAS]
     said = words.missing(found)
-    assert said.startswith("The sensor `imu_gyro.z` shows 0.1")
+    assert said.startswith("The sensor of imu_gyro.z shows 0.1")
     assert "Besides, what is missing is **rolling resistance** or **toe**, which these" in said
     assert said.endswith(
         "the correction has **rolling resistance** (coefficient 0.01460 ± 0.00040)."
@@ -245,7 +245,7 @@ def test_no_name_where_none_is_named(verdict):
 
 def test_words_from_outside_are_escaped():
     html = page(Diagnosis(verdict=Verdict.NAMED, effects=[BIAS]), {}, "<i>title</i> & more")
-    assert "&lt;m/s&gt;" in html and "sensor <code>imu_gyro.z</code> shows" in html
+    assert "&lt;m/s&gt;" in html and "sensor of imu_gyro.z shows" in html
     assert "<m/s>" not in html and "<i>" not in html
     assert "&lt;i&gt;title&lt;/i&gt; &amp; more" in html
 

@@ -79,7 +79,7 @@ def sensor_words(effect: NamedEffect) -> str:
         )
         shows = f"shows {by} too {much}"
     what = ", ".join(_parameters(effect))
-    return f"the sensor `{effect.channel}` {shows} ({bold(effect.name)}: {what})"
+    return f"the sensor of {effect.channel} {shows} ({bold(effect.name)}: {what})"
 
 
 def _capital(text: str) -> str:
