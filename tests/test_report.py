@@ -205,6 +205,8 @@ def test_a_sensor_at_fault_is_no_lack_of_the_chair(name, parameter, value, unit,
     alone = Diagnosis(verdict=Verdict.NAMED, effects=[fault])
     assert words.missing(alone).startswith(f"The sensor of heading {said}")
     assert words.next_step(alone).endswith("the chair lacks nothing.")
+    left = dataclasses.replace(alone, more_missing=True)
+    assert words.next_step(left).endswith("correct what the sensor shows.")
     both = Diagnosis(verdict=Verdict.NAMED, effects=[fault, ROLLING])
     assert "The chair lacks **rolling resistance** (" in words.missing(both)
     assert f"), and the sensor of heading {said}" in words.missing(both)

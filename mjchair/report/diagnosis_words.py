@@ -254,8 +254,9 @@ def next_step(diagnosis: Diagnosis) -> str:
     if not diagnosis.next_experiment:
         if diagnosis.verdict == Verdict.NONE:
             return "Nothing is needed; use the chair as it is."
-        if all(e.channel is not None for e in diagnosis.effects):
-            return "These data decide: correct what the sensor shows; the chair lacks nothing."
+        if diagnosis.effects and all(e.channel is not None for e in diagnosis.effects):
+            chair = "" if diagnosis.more_missing else "; the chair lacks nothing"
+            return f"These data decide: correct what the sensor shows{chair}."
         return "These data decide; use the corrected chair (model.xml)."
     return first_sentence(diagnosis.next_experiment)
 
