@@ -51,47 +51,26 @@ def keep(m: ModelView, d: DataView) -> None:
 def _missing_force(m: ModelView, d: DataView, root: int) -> Vector:
     """What the step as MuJoCo takes it lacks on a chair, N, along the world's axes.
 
-    MuJoCo's own balance of the free joint is `mass * rate + qfrc_bias`, Newton's is `mass *
-    (onward + back) / step^2 - weight`.
+    All that acts on it makes, as Newton says, `mass * (onward + back) / step^2`.
     """
     step, first = m.timestep, m.body_dofadr[root]
     mass, heavy = m.body_subtreemass[root], 0.0
     if not m.disableflags & WITHOUT_GRAVITY:
         heavy = mass
-    ax, ay, az = _rate(m, d, root)
     ox, oy, oz = _travel(m, d, root, step, step)
     bx, by, bz = _travel(m, d, root, 0.0, -step)
     per = mass / (step * step)
     return (
-        mass * ax - per * (ox + bx) + heavy * m.gravity[0] + d.qfrc_bias[first],
-        mass * ay - per * (oy + by) + heavy * m.gravity[1] + d.qfrc_bias[first + 1],
-        mass * az - per * (oz + bz) + heavy * m.gravity[2] + d.qfrc_bias[first + 2],
+        _acting(d, first) + heavy * m.gravity[0] - per * (ox + bx),
+        _acting(d, first + 1) + heavy * m.gravity[1] - per * (oy + by),
+        _acting(d, first + 2) + heavy * m.gravity[2] - per * (oz + bz),
     )
 
 
 @register_jitable(forceinline=True)
-def _rate(m: ModelView, d: DataView, root: int) -> Vector:
-    """The part of the centre's acceleration that `qacc` gives at these places, m/s^2."""
-    x = y = z = 0.0
-    own = m.body_dofadr[root] + 6
-    cx, cy, cz = d.subtree_com[root, 0], d.subtree_com[root, 1], d.subtree_com[root, 2]
-    for body in range(root, m.nbody):
-        if m.body_rootid[body] == root:
-            px, py, pz = d.xipos[body, 0] - cx, d.xipos[body, 1] - cy, d.xipos[body, 2] - cz
-            dof = _last_dof(m, body)
-            while dof >= own:
-                by = m.body_mass[body] * d.qacc[dof]
-                x += by * (d.cdof[dof, 3] + d.cdof[dof, 1] * pz - d.cdof[dof, 2] * py)
-                y += by * (d.cdof[dof, 4] + d.cdof[dof, 2] * px - d.cdof[dof, 0] * pz)
-                z += by * (d.cdof[dof, 5] + d.cdof[dof, 0] * py - d.cdof[dof, 1] * px)
-                dof = m.dof_parentid[dof]
-    whole = m.body_subtreemass[root]
-    x, y, z = x / whole, y / whole, z / whole
-    for dof in range(own - 6, own):
-        x += d.qacc[dof] * d.cdof[dof, 3]
-        y += d.qacc[dof] * d.cdof[dof, 4]
-        z += d.qacc[dof] * d.cdof[dof, 5]
-    return x, y, z
+def _acting(d: DataView, dof: int) -> float:
+    """What acts on a degree of freedom besides the weight, which `qfrc_bias` holds, N or N m."""
+    return d.qfrc_smooth[dof] + d.qfrc_constraint[dof] + d.qfrc_bias[dof]
 
 
 @register_jitable(forceinline=True)

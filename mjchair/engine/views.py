@@ -108,6 +108,7 @@ class DataView(NamedTuple):
     qacc_smooth: Reals
     qfrc_smooth: Reals
     qfrc_bias: Reals
+    qfrc_constraint: Reals
     ctrl: Reals
     act: Reals
     act_dot: Reals
