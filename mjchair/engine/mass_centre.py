@@ -70,7 +70,7 @@ def _missing_force(m: ModelView, d: DataView, root: int) -> Vector:
 @register_jitable(forceinline=True)
 def _acting(d: DataView, dof: int) -> float:
     """What acts on a degree of freedom besides the weight, which `qfrc_bias` holds, N or N m."""
-    return d.qfrc_smooth[dof] + d.qfrc_constraint[dof] + d.qfrc_bias[dof]
+    return float(d.qfrc_smooth[dof] + d.qfrc_constraint[dof] + d.qfrc_bias[dof])
 
 
 @register_jitable(forceinline=True)
