@@ -112,6 +112,9 @@ class Process:
     encoders: Mapping[int, int] = field(default_factory=dict)
     wobbles: Mapping[int, float] = field(default_factory=dict)
     _white: WeakKeyDictionary[Whitener, dict[int, Array]] = field(default_factory=WeakKeyDictionary)
+    _scaled: WeakKeyDictionary[Whitener, dict[int, Array]] = field(
+        default_factory=WeakKeyDictionary, init=False
+    )
 
     @cached_property
     def _places(self) -> dict[int, list[int]]:
@@ -154,6 +157,12 @@ class Process:
 
     def white_columns(self, window: int, whitener: Whitener) -> Array:
         """Columns (amplitudes, k) of the disturbances, each of one standard deviation."""
+        known = self._scaled.setdefault(whitener, {})
+        if window not in known:
+            known[window] = self._of_one_deviation(window, whitener)
+        return known[window]
+
+    def _of_one_deviation(self, window: int, whitener: Whitener) -> Array:
         out = []
         run = int(self.runs[window])
         for force in SHAKEN:

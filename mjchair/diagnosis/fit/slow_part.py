@@ -50,23 +50,42 @@ def slow_components(
       (components, 1 + nuisances) each, the residual first.
     """
     left = window.without_state(np.column_stack([window.r, window.J[:, :nuisances]]))
+    every = np.concatenate(rows)
     own = window.Z[:, : window.states]
     start = cho_factor(own.T @ own + np.diag(window.precision[: window.states]))
-    out = []
-    for mine in [*rows, np.concatenate(rows)]:
-        if not mine.size:
-            out.append(np.zeros((0, 1 + nuisances)))
-            continue
-        # over the directions that a free start leaves, each against the whole noise in it
-        free = np.eye(mine.size) - own[mine] @ cho_solve(start, own[mine].T)
-        values, vectors = np.linalg.eigh(free)
-        along = vectors[:, values > LEFT]
-        Z = window.Z[mine]
-        inner = np.eye(mine.size) - Z @ cho_solve(window.factor, Z.T)
-        power, axes = np.linalg.eigh(along.T @ inner @ along)
-        root = axes / np.sqrt(np.maximum(power, 1e-9))
-        out.append(root.T @ (along.T @ left[mine]))
-    return out
+    free, inner = _left_by(own[every], start), _left_by(window.Z[every], window.factor)
+    ends = np.cumsum([mine.size for mine in rows])
+    places = [np.arange(end - mine.size, end) for end, mine in zip(ends, rows, strict=True)]
+    out: list[Array] = [np.empty(0)] * len(rows)
+    for size in {mine.size for mine in rows}:
+        alike = [k for k, mine in enumerate(rows) if mine.size == size]
+        at = np.array([places[k] for k in alike])
+        square = at[:, :, None], at[:, None, :]
+        parts = _against_noise(free[square], inner[square], left[every[at]])
+        for k, shown in zip(alike, parts, strict=True):
+            out[k] = shown
+    return [*out, *_against_noise(free[None], inner[None], left[every][None])]
+
+
+def _against_noise(free: Array, inner: Array, left: Array) -> list[Array]:
+    """Of each of n parts the directions that a free start leaves, over the whole noise in them.
+
+    Args:
+      free, inner: (n, m, m) what a free start, and all that is eliminated, leave. left: (n, m, k).
+    """
+    values, along = np.linalg.eigh(free)
+    kept = values > LEFT
+    turned = along.transpose(0, 2, 1)
+    power = turned @ inner @ along
+    power[~(kept[:, :, None] & kept[:, None, :])] = 0.0  # the others stand alone
+    power += np.eye(power.shape[1]) * np.where(kept, 1e-9, 1.0)[:, None, :]
+    shown = np.linalg.solve(np.linalg.cholesky(power), turned @ left)
+    return [part[rows] for part, rows in zip(shown, kept, strict=True)]
+
+
+def _left_by(columns: Array, factor: tuple[Array, bool]) -> Array:
+    """What columns (n, k), eliminated with a factor of their block, leave of n directions."""
+    return np.asarray(np.eye(len(columns)) - columns @ cho_solve(factor, columns.T))
 
 
 def cells(components: Sequence[Array], step: Array) -> Cells:

@@ -27,7 +27,7 @@ from mjchair.diagnosis.replay.chair_state import SLOW, STEPS, State
 from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.pulses import Pulse, pulse_answers, pulses
 from mjchair.diagnosis.replay.sensor_errors import SensorErrors
-from mjchair.diagnosis.replay.simulator import Job, Outcome, WindowSimulator
+from mjchair.diagnosis.replay.simulator import STATE, Job, Outcome, WindowSimulator
 from mjchair.diagnosis.replay.window_states import Track
 from mjchair.effects.effect import SensorError
 from mjchair.engine.install import installed
@@ -155,7 +155,7 @@ class Rehearsal:
         """Whole runs, with their traces."""
         windows = self.longer.windows
         jobs = [Job(self.model(chair), w, s) for w, s in zip(windows, states, strict=True)]
-        return self.longer.run(jobs, trace=True)
+        return self.longer.run(jobs, trace=STATE)
 
     def _nudged(self, chair: Version) -> list[dict[str, Array]]:
         """Traces of whole runs that start a little turning."""
@@ -193,7 +193,7 @@ class Rehearsal:
         jobs = [
             Job(self.model(chair), w, s) for w, s in zip(simulator.windows, states, strict=True)
         ]
-        outcomes = simulator.run(jobs, trace=True)
+        outcomes = simulator.run(jobs, trace=STATE)
         seen = chair.sensor_errors(simulator.channels)
         predicted = [
             seen.applied(simulator, w, o.predicted)

@@ -14,10 +14,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjchair.diagnosis.replay.chair_state import Chair
-from mjchair.diagnosis.replay.derivatives import predictions
-from mjchair.diagnosis.replay.sensor_errors import SensorErrors
-from mjchair.diagnosis.replay.simulator import Job, WindowSimulator
+from mjchair.diagnosis.replay.chair_state import Chair, State
+from mjchair.diagnosis.replay.simulator import COURSE, STATE, Job, Outcome, Sofar, WindowSimulator
 from mjchair.diagnosis.replay.window_states import Track
 from mjchair.engine.install import installed
 
@@ -89,26 +87,58 @@ def pulse_answers(
     asked: Sequence[Pulse],
     base_edit: Callable[[mujoco.MjSpec], None] | None = None,
 ) -> list[Array]:
-    """What each pulse of one newton or newton metre changes in its own window, (rows, channels)."""
-    out = []
+    """What each pulse of one newton or newton metre changes in its own window, (rows, channels).
+
+    Nothing changes before a pulse begins, so each is simulated from there.
+    """
+    out: list[Array] = [np.empty(0)] * len(asked)
     model = simulator.coarsened(simulator.compile(base_edit))
     chair = Chair(model)  # an effect may add joints before the wheels'
     with installed():
-        reference = predictions(simulator, track, model, SensorErrors(simulator.channels))
+        free = _without_force(simulator, track, asked, model)
+        begins = [_begin(simulator, p, model) for p in asked]
+        order = sorted(range(len(asked)), key=begins.__getitem__)
         for at in range(0, len(asked), AT_ONCE):
-            group = asked[at : at + AT_ONCE]
+            group = order[at : at + AT_ONCE]
             jobs = [
                 Job(
                     model,
-                    simulator.windows[p.window],
-                    track.states[p.window],
-                    _force(simulator, track, p, model, chair),
+                    simulator.windows[asked[k].window],
+                    track.states[asked[k].window],
+                    _force(simulator, track, asked[k], model, chair),
+                    sofar=_until(begins[k], free[asked[k].window]),
                 )
-                for p in group
+                for k in group
             ]
-            for p, outcome in zip(group, simulator.run(jobs), strict=True):
-                out.append((outcome.predicted - reference[p.window]) / KINDS[p.force].size)
+            for k, outcome in zip(group, simulator.run(jobs), strict=True):
+                change = outcome.predicted - free[asked[k].window].predicted
+                out[k] = change / KINDS[asked[k].force].size
     return out
+
+
+def _without_force(
+    simulator: WindowSimulator, track: Track, asked: Sequence[Pulse], model: mujoco.MjModel
+) -> dict[int, Outcome]:
+    """The windows of the pulses as they go without any."""
+    which = sorted({p.window for p in asked})
+    jobs = [Job(model, simulator.windows[i], track.states[i]) for i in which]
+    return dict(zip(which, simulator.run(jobs, trace=COURSE), strict=True))
+
+
+def _begin(simulator: WindowSimulator, pulse: Pulse, model: mujoco.MjModel) -> int:
+    """The first step on which a pulse acts; 0 for the first of a window."""
+    w = simulator.windows[pulse.window]
+    if pulse.time - pulse.width < w.first:
+        return 0
+    return int((pulse.time - pulse.width - w.start) / model.opt.timestep)
+
+
+def _until(step: int, free: Outcome) -> Sofar | None:
+    """How a simulation went up to a step; None: it has not begun."""
+    if step < 1:
+        return None
+    state = State(*(free.trace[name][step - 1] for name in STATE))
+    return Sofar(step, state, free.trace["sensordata"][:step])
 
 
 def _force(

@@ -36,6 +36,21 @@ from mjchair.simulation import batch, names
 Array = NDArray[np.float64]
 NO_BODY = ("mjMINVAL", "A + B >= C")  # MuJoCo's words for it
 FORCE = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+STATE = ("qpos", "qvel", "act")
+COURSE = (*STATE, "sensordata")  # all that another simulation needs to go on from any step
+
+
+@dataclass(frozen=True)
+class Sofar:
+    """How a simulation went up to a step, from which another of the same model goes on.
+
+    Attributes:
+      step: which. state: before it, of that very model. sensed: (step, nsensordata) so far.
+    """
+
+    step: int
+    state: State
+    sensed: Array
 
 
 @dataclass
@@ -46,6 +61,7 @@ class Job:
       model: what is simulated, without the load of its run. window: which.
       state: at the window's start, of the base model.
       force: (steps, nv) generalized force on top, or None. late: s, by which inputs come later.
+      sofar: how it went until the force began; None: it is simulated from the window's start.
     """
 
     model: mujoco.MjModel
@@ -53,6 +69,12 @@ class Job:
     state: State
     force: Array | None = None
     late: float = 0.0
+    sofar: Sofar | None = None
+
+    @property
+    def begin(self) -> int:
+        """The first step that is simulated."""
+        return 0 if self.sofar is None else self.sofar.step
 
 
 @dataclass
@@ -216,8 +238,12 @@ class WindowSimulator:
                 place, speed = place + share * there[0], speed + share * there[1]
         return place, speed
 
-    def run(self, jobs: Sequence[Job], trace: bool = False) -> list[Outcome]:
-        """Simulate the jobs, or load what the store kept of them; traces are not kept."""
+    def run(self, jobs: Sequence[Job], trace: Sequence[str] = ()) -> list[Outcome]:
+        """Simulate the jobs, or load what the store kept of them; traces are not kept.
+
+        Args:
+          trace: what is asked for along the way, after each step, of COURSE.
+        """
         if self.store is None or trace:
             return self._simulate(jobs, trace)
         key = self._key(jobs, self.store)
@@ -237,17 +263,22 @@ class WindowSimulator:
             parts += [places[id(job.model)], job.late, w.run, w.start, w.rows]
             parts += [state.qpos, state.qvel, state.act]
             parts.append(job.force if job.force is not None else "free")
+            if job.sofar is not None:
+                begun = job.sofar
+                parts += [begun.step, begun.state.qpos, begun.state.qvel, begun.state.act]
+                parts.append(begun.sensed)
         return store.key(models.values(), parts)
 
-    def _simulate(self, jobs: Sequence[Job], trace: bool) -> list[Outcome]:
+    def _simulate(self, jobs: Sequence[Job], trace: Sequence[str]) -> list[Outcome]:
         """Equal model sizes go together."""
         jobs = self._as_in_their_runs(jobs)
         outcomes: list[Outcome | None] = [None] * len(jobs)
-        models, driven = [job.model for job in jobs], [job.force is None for job in jobs]
-        record = ("sensordata", *(("qpos", "qvel", "act") if trace else ()))
-        for chunk in batch.groups(models, self._steps, record, driven):
+        models = [job.model for job in jobs]
+        apart = [(job.force is None, job.begin) for job in jobs]
+        record = tuple(dict.fromkeys(("sensordata", *trace)))
+        for chunk in batch.groups(models, self._steps, record, apart):
             with installed():
-                done = self._chunk([jobs[i] for i in chunk], record)
+                done = self._chunk([jobs[i] for i in chunk], record, trace)
             for i, outcome in zip(chunk, done, strict=True):
                 outcomes[i] = outcome
         return [o for o in outcomes if o is not None]
@@ -272,9 +303,10 @@ class WindowSimulator:
     def _steps(self, model: mujoco.MjModel) -> int:
         return int(np.ceil(self.steps * self.step / model.opt.timestep)) + 1
 
-    def _chunk(self, jobs: list[Job], record: Sequence[str]) -> list[Outcome]:
+    def _chunk(self, jobs: list[Job], record: Sequence[str], trace: Sequence[str]) -> list[Outcome]:
+        """Jobs of one model size that begin at the same step."""
         models = [job.model for job in jobs]
-        model = models[0]
+        model, begin = models[0], jobs[0].begin
         steps = self._steps(model)
         kept: dict[tuple[int, int, float], Array] = {}
         rows = []
@@ -287,21 +319,22 @@ class WindowSimulator:
         if jobs[0].force is not None:
             forces = np.stack([_resized(j.force, steps) for j in jobs])
             control, what = np.concatenate([control, forces], axis=2), what | FORCE
-        states = self._states(jobs, model)
+        states, control = self._states(jobs, model), control[:, begin:]
         out, _ = batch.roll(models, states, control, what=what, record=record, threads=self.threads)
-        return [
-            Outcome(
-                self._sampled(model, job.window, out["sensordata"][i]),
-                {k: out[k][i] for k in record[1:]},
-            )
-            for i, job in enumerate(jobs)
-        ]
+        done = []
+        for i, job in enumerate(jobs):
+            sensed = out["sensordata"][i]
+            if job.sofar is not None:
+                sensed = np.concatenate([job.sofar.sensed, sensed])
+            predicted = self._sampled(model, job.window, sensed)
+            done.append(Outcome(predicted, {k: out[k][i] for k in trace}))
+        return done
 
     def _states(self, jobs: list[Job], model: mujoco.MjModel) -> dict[str, Array]:
         """Of the jobs' starts: time (jobs,), qpos, qvel and act (jobs, ...)."""
         states = [self._state_in(job) for job in jobs]
         return {
-            "time": np.array([job.window.start for job in jobs]),
+            "time": np.array([job.window.start + job.begin * model.opt.timestep for job in jobs]),
             "qpos": np.stack([state.qpos for state in states]),
             "qvel": np.stack([state.qvel for state in states]),
             "act": np.stack([state.act for state in states]),
@@ -309,6 +342,8 @@ class WindowSimulator:
 
     def _state_in(self, job: Job) -> State:
         """The state where a job starts, in its own model."""
+        if job.sofar is not None:
+            return job.sofar.state
         state, new = self.carrier.into(job.model, job.state)
         for name, (q, v) in new.joints.items():
             followed = self._followed(job.model, name, job)

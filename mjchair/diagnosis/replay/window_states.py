@@ -20,7 +20,7 @@ from mjchair.diagnosis.replay.chair_state import BROAD, LINKED, SLOW, STANDING, 
 from mjchair.diagnosis.replay.noise import Noise
 from mjchair.diagnosis.replay.sampling import residual
 from mjchair.diagnosis.replay.sensor_errors import SensorErrors
-from mjchair.diagnosis.replay.simulator import Job, Outcome, WindowSimulator
+from mjchair.diagnosis.replay.simulator import STATE, Job, Outcome, WindowSimulator
 from mjchair.engine.install import installed
 from mjchair.measurement.sensors import sensor
 from mjchair.simulation import names
@@ -230,7 +230,7 @@ def _traced(
     simulator: WindowSimulator, model: mujoco.MjModel, states: dict[int, State]
 ) -> dict[int, Outcome]:
     jobs = [Job(model, simulator.windows[i], state) for i, state in states.items()]
-    done = simulator.run(jobs, trace=True) if jobs else []
+    done = simulator.run(jobs, trace=STATE) if jobs else []
     return dict(zip(states, done, strict=True))
 
 
