@@ -11,7 +11,7 @@ from scipy.optimize import lsq_linear
 
 import mjchair
 from mjchair.cli import main
-from mjchair.diagnosis import rules
+from mjchair.diagnosis import decide, rules
 from mjchair.diagnosis.diagnose import diagnose
 from mjchair.diagnosis.explain import event
 from mjchair.diagnosis.fit import bounded
@@ -188,3 +188,10 @@ def _falls(model, state):
     data.qpos[:], data.qvel[:], data.act[:] = state.qpos, state.qvel, state.act
     mujoco.mj_forward(model, data)
     return np.abs(data.qacc[2])
+
+
+def test_a_phase_is_reported_within_half_a_turn():
+    parameters = {p.name: p for p in find("rider_motion").parameters}
+    assert decide._shown(parameters["phase"], -3.335) == pytest.approx(2.0 * np.pi - 3.335)
+    assert decide._shown(parameters["frequency"], 4.0) == 4.0
+    assert decide._shown(find("camber").parameters[0], 4.0) == 4.0  # rad, but of a geometry

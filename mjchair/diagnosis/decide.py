@@ -53,6 +53,7 @@ from mjchair.diagnosis.result import (
     Stages,
 )
 from mjchair.diagnosis.rules import Verdict
+from mjchair.effects.effect import Parameter
 from mjchair.errors import MjchairError
 
 Array = NDArray[np.float64]
@@ -253,12 +254,18 @@ def _alternatives(choice: Choice, once: bool) -> list[list[str]]:
     return out
 
 
+def _shown(parameter: Parameter, value: float) -> float:
+    """The value as it is reported: a phase (rad), which a fit may carry on, within half a turn."""
+    is_phase = parameter.each_run and parameter.unit == "rad"
+    return math.remainder(value, 2.0 * math.pi) if is_phase else value
+
+
 def _named(fitted: Fitted, closed: float) -> list[NamedEffect]:
     out = []
     for term in fitted.variant.terms:
         parameters = {
             p.name: Estimate(
-                value=float(term.values[p.name]),
+                value=_shown(p, float(term.values[p.name])),
                 std=fitted.std.get(ParameterId(term.effect.key, p.name)),
                 unit=p.unit,
                 at_least=fitted.at_least.get(ParameterId(term.effect.key, p.name)),
