@@ -387,7 +387,15 @@ def fell_short(*, total: float, promised: float, gain: float) -> bool:
 
     What a small effect misses of its promise is not for its size: where it starts makes no odds.
     """
-    return gain > WORTH / SHORT and total - promised >= SHORT * gain
+    return total >= short_of(promised=promised, gain=gain)
+
+
+def short_of(*, promised: float, gain: float) -> float:
+    """Chi2 from which a fit falls short of what linear algebra promises.
+
+    No fit of a small effect does.
+    """
+    return promised + SHORT * gain if gain > WORTH / SHORT else math.inf
 
 
 def worth_refitting(*, behind: float, gain: float, rival_gain: float) -> bool:

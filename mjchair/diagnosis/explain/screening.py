@@ -256,8 +256,9 @@ def _holding(
     """
     for h in options:
         start = replace(base.around.variant, terms=hypotheses.terms(reduced, h))
+        reach = rules.short_of(promised=reduced.total - h.gain, gain=h.gain)
         try:
-            fitted = refit(bench, start, base.around.track, base.nuisances, ROUNDS)
+            fitted = refit(bench, start, base.around.track, base.nuisances, ROUNDS, reach=reach)
         except (MjchairError, np.linalg.LinAlgError):
             continue  # these effects this chair cannot have
         found = Found(h.starts, fitted)
