@@ -187,6 +187,17 @@ def test_a_named_effect_comes_with_value_and_uncertainty():
     assert said == "The chair lacks **rolling resistance** (coefficient 0.01460 ± 0.00040)."
 
 
+def test_what_a_correction_leaves_is_told_apart_from_what_is_only_roughly_known():
+    def said(after, unforeseen):
+        gap = GapSummary(before=9.0, after=after, scope="held-out trials", p_value=0.0,
+                         p_value_after=0.3, unforeseen=unforeseen)  # fmt: skip
+        found = Diagnosis(verdict=Verdict.NAMED, effects=[ROLLING], gap=gap)
+        return words.unforeseen_words(found)
+
+    assert "Of the 2.7 times the noise" in said(2.7, 1.1) and "all but 1.1" in said(2.7, 1.1)
+    assert said(2.7, 2.6) == said(1.2, 0.9) == said(2.7, None) == ""
+
+
 @pytest.mark.parametrize(
     ("name", "parameter", "value", "unit", "said"),
     [

@@ -28,6 +28,7 @@ from mjchair.diagnosis.explain.left_out import (
     on_held_out,
     over_noise,
     slow_part,
+    unforeseen,
 )
 from mjchair.diagnosis.explain.probability import of_any, of_effects, probabilities, with_gap
 from mjchair.diagnosis.explain.rivals import with_probable
@@ -326,6 +327,7 @@ def _summary(base: Base, gap: Gap, choice: Choice | None) -> GapSummary:
         scope=f"{who}: rms of the whitened residual below {BAND:g} Hz",
         p_value=gap.p,
         p_value_after=choice.after.p if choice else None,
+        unforeseen=unforeseen(base, choice.fitted) if choice and held.size else None,
     )
 
 

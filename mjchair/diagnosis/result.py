@@ -109,8 +109,10 @@ class Candidate:
 class GapSummary:
     """Rms of the whitened residual before and after, over the trials of `scope`; noise gives 1.
 
-    `after` is what the corrected chair leaves, None where there is none. `p_value` and
-    `p_value_after` are of all tests together, on the trials that were fitted to.
+    `after` is what the corrected chair leaves, None where there is none. `unforeseen` is what is
+    left of it without what the fitted trials leave open of the numbers that are only roughly known;
+    None where no trial is held out. `p_value` and `p_value_after` are of all tests together, on the
+    trials that were fitted to.
     """
 
     before: float
@@ -118,6 +120,7 @@ class GapSummary:
     scope: str
     p_value: float
     p_value_after: float | None
+    unforeseen: float | None = None
     noise_floor: float = 1.0
 
 

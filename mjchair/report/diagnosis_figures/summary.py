@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from mjchair.diagnosis.result import Diagnosis
 from mjchair.report.colours import AFTER, BEFORE
 from mjchair.report.diagnosis_figures.whole_runs import draw_run, telling
-from mjchair.report.diagnosis_words import size
+from mjchair.report.diagnosis_words import size, unforeseen_words
 from mjchair.report.figure import Figure
 
 PLATE = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}  # behind a number
@@ -63,5 +63,5 @@ def caption(diagnosis: Diagnosis) -> str:
     kind = "that no fit has seen" if runs[0].held_out else "of the fit, since none is held out"
     return (
         f"Left: the run {runs[0].trial}, {kind}, simulated in one go from its first state with the "
-        "measured inputs. Right: what the windows of 2 s leave."
+        "measured inputs. Right: what the windows of 2\N{NO-BREAK SPACE}s leave." + unforeseen_words(diagnosis)
     )
