@@ -44,6 +44,32 @@ def test_a_pulse_acts_on_the_same_joint_of_a_chair_with_more_joints(coast):
         assert np.abs(other - one).max() < 0.05 * np.abs(one).max(), pulse.force
 
 
+@pytest.mark.parametrize(("force", "at"), [(Force.YAW, 1.0), (Force.LEFTWARD, 1.6)])
+def test_a_pulse_that_begins_later_answers_as_one_simulated_from_the_start(
+    coast, monkeypatch, force, at
+):
+    """Before it begins nothing changes, so it goes on from the course without it."""
+    simulator, found = coast
+    asked = [
+        Pulse(force, 0, _time(simulator, 0, at), 0.2),
+        Pulse(force, 1, _time(simulator, 1, at), 0.2),
+    ]
+    late = pulses.pulse_answers(simulator, found, asked)
+    monkeypatch.setattr(pulses, "_begin", lambda *_: 0)
+    whole = pulses.pulse_answers(simulator, found, asked)
+    for pulse, one, other in zip(asked, late, whole, strict=True):
+        w = simulator.windows[pulse.window]
+        time = simulator.study.runs[w.run].trial.time[w.rows]
+        assert (one[time < pulse.time - pulse.width - 0.01] == 0.0).all()
+        assert np.abs(other).max() > 0.0
+        assert np.abs(other - one).max() < 1e-8 * np.abs(other).max()
+
+
+def _time(simulator, window, after):
+    """A time (s) of a run, this long after a window begins."""
+    return simulator.windows[window].first + after
+
+
 def test_windows_that_are_not_asked_for_stay_as_they_were(coast):
     """A heavier chair's states in one window alone are those that it has in a track of all."""
     simulator, found = coast

@@ -352,6 +352,9 @@ def test_a_fit_starts_again_where_it_misses_the_promise():
     assert rules.fell_short(total=1021.0, promised=1000.0, gain=200.0)
     assert not rules.fell_short(total=1099.0, promised=1000.0, gain=1000.0)
     assert rules.fell_short(total=1101.0, promised=1000.0, gain=1000.0)
+    # and from the same chi2 on a fit of the noise is not followed
+    assert rules.short_of(promised=1000.0, gain=1000.0) == pytest.approx(1100.0)
+    assert rules.short_of(promised=1000.0, gain=50.0) == float("inf")
 
 
 def test_a_rival_is_fitted_where_linear_algebra_leaves_it_near():
