@@ -63,5 +63,6 @@ def caption(diagnosis: Diagnosis) -> str:
     kind = "that no fit has seen" if runs[0].held_out else "of the fit, since none is held out"
     return (
         f"Left: the run {runs[0].trial}, {kind}, simulated in one go from its first state with the "
-        "measured inputs. Right: what the windows of 2\N{NO-BREAK SPACE}s leave." + unforeseen_words(diagnosis)
+        "measured inputs. Right: what the windows of 2\N{NO-BREAK SPACE}s leave."
+        + unforeseen_words(diagnosis)
     )
