@@ -118,7 +118,9 @@ def around_which(monkeypatch, fits, on_bound=(), count=None):
     """
     answers = iter(fits)
 
-    def refit(*_):
+    def refit(*_, reach):
+        # linear algebra leaves 300; what promises to miss a tenth of the gain is not followed
+        assert reach == pytest.approx(300.0 + 0.1 * 1e6)
         answer = next(answers)
         if isinstance(answer, MjchairError):
             raise answer
