@@ -28,7 +28,6 @@ from mjchair.diagnosis.explain.left_out import (
     on_held_out,
     over_noise,
     slow_part,
-    unforeseen,
 )
 from mjchair.diagnosis.explain.probability import of_any, of_effects, probabilities, with_gap
 from mjchair.diagnosis.explain.rivals import with_probable
@@ -99,7 +98,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         effects=_named(named.fitted, closed) if named else [],
         alternatives=_alternatives(undecided, once) if undecided else [],
         candidates=_candidates(base, gap, choice),
-        gap=_summary(base, gap, named),
+        gap=_summary(base, gap, named, stands.held_out if stands else None),
         where=_where(base),
         next_experiment=_following(base, choice, said, plan, left),
         notes=[*_notes(base, choice, closed, said, left), *unplanned],
@@ -316,18 +315,18 @@ def _shown_windows(base: Base) -> NDArray[np.int64]:
     return held if held.size else base.bench.windows
 
 
-def _summary(base: Base, gap: Gap, choice: Choice | None) -> GapSummary:
+def _summary(base: Base, gap: Gap, choice: Choice | None, held: rules.HeldOut | None) -> GapSummary:
     """The gap as it was, and as the corrected chair leaves it; without one there is no after."""
-    held, windows = held_windows(base), _shown_windows(base)
+    windows = _shown_windows(base)
     before, dof = slow_part(base.plain.system, windows)
-    who = "held-out trials" if held.size else "all trials, since none is held out"
+    who = "held-out trials" if held_windows(base).size else "all trials, since none is held out"
     return GapSummary(
         before=over_noise(before, dof),
         after=over_noise(slow_part(choice.fitted.system, windows)[0], dof) if choice else None,
         scope=f"{who}: rms of the whitened residual below {BAND:g} Hz",
         p_value=gap.p,
         p_value_after=choice.after.p if choice else None,
-        unforeseen=unforeseen(base, choice.fitted) if choice and held.size else None,
+        unforeseen=over_noise(held.after, held.dof) if choice and held else None,
     )
 
 

@@ -28,8 +28,8 @@ LEAST = 1e-6  # a chance below this is said to be below it
 TURNING = (Quantity.YAW_RATE, Quantity.HEADING, Quantity.SWIVEL, Quantity.RIGHT_TURN)
 TURNS = {"wheel_turn": str(Part.WHEEL_TURN), "caster_turn": str(Part.CASTER_TURN)}
 CLEAR = 0.5  # of what shakes the chair forward: a force once a turn of this size is told
-NOTABLE = 1.5  # times the noise: what a correction leaves above that is explained where it can be
-FORESEEN = 0.8  # of what it leaves: where no run foretells more than that, the rest is told
+NOTABLE = 1.5  # times the noise: where a correction leaves more, what can explain it is said
+A_GAP = 0.8  # of what a correction leaves: where no more than this is a gap, the rest is explained
 UNSURE = 0.005  # probabilities below this are not named
 
 
@@ -375,16 +375,19 @@ def runs_words(diagnosis: Diagnosis) -> str:
 
 
 def unforeseen_words(diagnosis: Diagnosis) -> str:
-    """Of what the corrected chair leaves there, how much is a gap; nothing where all of it is."""
+    """How much of what the corrected chair leaves on held-out runs is a gap.
+
+    Nothing where it is nearly all of it, or where little is left.
+    """
     gap = diagnosis.gap
     if gap is None or gap.after is None or gap.unforeseen is None or not diagnosis.effects:
         return ""
-    if gap.after < NOTABLE or gap.unforeseen > FORESEEN * gap.after:
+    if gap.after < NOTABLE or gap.unforeseen > A_GAP * gap.after:
         return ""
     return (
         f" Of the {size(gap.after)} times the noise that the corrected chair leaves, all but "
-        f"{size(gap.unforeseen)} can be numbers that the study knows only roughly and the runs of "
-        "the fit hardly show."
+        f"{size(gap.unforeseen)} can come from numbers that the study knows only roughly, and that "
+        "the runs of the fit hardly show."
     )
 
 

@@ -124,11 +124,6 @@ def on_held_out(base: Base, fitted: Fitted) -> rules.HeldOut | None:
     return rules.HeldOut(before=before, after=after, dof=dof, changed=changed)
 
 
-def unforeseen(base: Base, fitted: Fitted) -> float:
-    """The gap of the held-out trials that the fitted ones do not foretell; noise gives 1."""
-    return over_noise(*_foretold(base, fitted, held_windows(base)))
-
-
 def lone_run(base: Base, fitted: Fitted) -> Lone | None:
     """The held-out run that disagrees far more than every run of the fit; None: there is none."""
     held, others = [], 0.0

@@ -262,10 +262,9 @@ def _holding(
         except (MjchairError, np.linalg.LinAlgError):
             continue  # these effects this chair cannot have
         found = Found(h.starts, fitted)
-        short = rules.fell_short(total=fitted.total, promised=reduced.total - h.gain, gain=h.gain)
         settled = rules.has_settled(total=fitted.total, promised=fitted.promised)
         pushed = fitted.at_bound or bounded.at_walls(fitted.variant.offsets)
-        if settled and not short and not pushed:
+        if settled and fitted.total < reach and not pushed:
             return found
         made.append((fitted.total + h.penalty, found))
     return None

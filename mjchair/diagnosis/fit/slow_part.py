@@ -54,17 +54,17 @@ def slow_components(
     own = window.Z[:, : window.states]
     start = cho_factor(own.T @ own + np.diag(window.precision[: window.states]))
     free, inner = _left_by(own[every], start), _left_by(window.Z[every], window.factor)
-    ends = np.cumsum([mine.size for mine in rows])
-    places = [np.arange(end - mine.size, end) for end, mine in zip(ends, rows, strict=True)]
-    out: list[Array] = [np.empty(0)] * len(rows)
-    for size in {mine.size for mine in rows}:
-        alike = [k for k, mine in enumerate(rows) if mine.size == size]
-        at = np.array([places[k] for k in alike])
+    together = np.arange(every.size)
+    parts = [*np.split(together, np.cumsum([mine.size for mine in rows])[:-1]), together]
+    out: list[Array] = [np.empty(0)] * len(parts)
+    for size in {part.size for part in parts}:  # parts of one size are one stack of matrices
+        alike = [k for k, part in enumerate(parts) if part.size == size]
+        at = np.array([parts[k] for k in alike])
         square = at[:, :, None], at[:, None, :]
-        parts = _against_noise(free[square], inner[square], left[every[at]])
-        for k, shown in zip(alike, parts, strict=True):
-            out[k] = shown
-    return [*out, *_against_noise(free[None], inner[None], left[every][None])]
+        shown = _against_noise(free[square], inner[square], left[every[at]])
+        for k, components in zip(alike, shown, strict=True):
+            out[k] = components
+    return out
 
 
 def _against_noise(free: Array, inner: Array, left: Array) -> list[Array]:

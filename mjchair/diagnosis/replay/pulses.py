@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjchair.diagnosis.data.windows import Window
 from mjchair.diagnosis.replay.chair_state import Chair, State
 from mjchair.diagnosis.replay.simulator import COURSE, STATE, Job, Outcome, Sofar, WindowSimulator
 from mjchair.diagnosis.replay.window_states import Track
@@ -128,9 +129,14 @@ def _without_force(
 def _begin(simulator: WindowSimulator, pulse: Pulse, model: mujoco.MjModel) -> int:
     """The first step on which a pulse acts; 0 for the first of a window."""
     w = simulator.windows[pulse.window]
-    if pulse.time - pulse.width < w.first:
+    if _is_first(pulse, w):
         return 0
     return int((pulse.time - pulse.width - w.start) / model.opt.timestep)
+
+
+def _is_first(pulse: Pulse, window: Window) -> bool:
+    """Whether a pulse is the first of its window, which acts from the start of the lead."""
+    return pulse.time - pulse.width < window.first
 
 
 def _until(step: int, free: Outcome) -> Sofar | None:
@@ -150,7 +156,7 @@ def _force(
     every = max(1, round(step / simulator.step))
     time = w.start + step * np.arange(steps)
     shape = np.clip(1.0 - np.abs(time - pulse.time) / pulse.width, 0.0, None)
-    if pulse.time - pulse.width < w.first:  # the first pulse acts from the start of the lead
+    if _is_first(pulse, w):
         shape[time < pulse.time] = 1.0
     force = np.zeros((steps, model.nv))
     size = KINDS[pulse.force].size * shape
