@@ -230,6 +230,16 @@ def test_rivals_are_in_the_first_sentence():
     assert "**floor slope** or **rolling resistance**" in said
 
 
+def test_alternatives_that_go_together_are_said_to():
+    sets = [["rolling_resistance", "toe+air_drag", "none"]]
+    found = Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets)
+    assert "**rolling resistance** or **toe** with **air drag** or nothing" in words.missing(found)
+    assert words.certain(dataclasses.replace(found, probability={"rolling_resistance": 1.0})) == []
+    found.alternatives = [["toe", "none"], ["toe+air_drag", "wind"]]
+    said = words.missing(found)
+    assert "**toe** or nothing; or **wind** in the place of **toe** with **air drag**, wh" in said
+
+
 def test_what_is_in_every_explanation_is_said_before_what_is_open():
     rivals = ["rolling_resistance", "toe"]
     found = Diagnosis(

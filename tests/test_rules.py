@@ -391,8 +391,10 @@ def test_what_keeps_a_rival(behind, gain, errors, beyond, stays):
 
 
 def test_what_is_probable_is_shown_as_a_rival():
-    assert rules.is_shown(0.10)
-    assert not rules.is_shown(0.09)
+    assert rules.is_shown(0.10, before=0.95)
+    assert not rules.is_shown(0.09, before=0.95)
+    assert rules.is_shown(0.02, before=0.94)  # without it less than 95 % are shown
+    assert not rules.is_shown(0.01, before=0.94)
 
 
 def test_what_was_moved_far_is_measured_to_either_side():

@@ -13,7 +13,7 @@ from unittest import mock
 import numpy as np
 import pytest
 
-from mjchair.diagnosis import rules
+from mjchair.diagnosis import decide, rules
 from mjchair.diagnosis.explain import (
     alternatives,
     backward_elimination,
@@ -23,13 +23,14 @@ from mjchair.diagnosis.explain import (
     left_over,
     multistart,
     open_ended,
+    probable,
     rivals,
     selection,
     shortlist,
     whole_sizes,
 )
 from mjchair.diagnosis.explain import fits as fits_of_hypotheses
-from mjchair.diagnosis.explain.choice import Tried
+from mjchair.diagnosis.explain.choice import Choice, Tried
 from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.fit import bounded
@@ -40,7 +41,10 @@ from mjchair.errors import MjchairError
 
 def effect(name, common=1.0):
     return SimpleNamespace(
-        effect=SimpleNamespace(key=name, common=common), free=("size",), group=name, columns=(name,)
+        effect=SimpleNamespace(key=name, name=name, common=common),
+        free=("size",),
+        group=name,
+        columns=(name,),
     )
 
 
@@ -84,6 +88,7 @@ def fits(monkeypatch):
         )
 
     monkeypatch.setattr(rules, "NOTHING", 0.0)  # no effect is so small that columns hold
+    monkeypatch.setattr(probable, "probabilities", lambda *_: {})
     monkeypatch.setattr(whole_sizes, "fits", lambda *_: ())
     monkeypatch.setattr(whole_sizes, "compared", lambda _, fitted: fitted)
     monkeypatch.setattr(open_ended, "with_least_sizes", lambda _, fitted: fitted)
@@ -372,17 +377,72 @@ def test_both_sides_are_free_where_the_data_leave_open_which_it_is(total, both_s
     assert selection._with_both_sides(looking, right) is right
 
 
+def chosen(hypothesis, tried, own_gains):
+    """A choice without rivals of what was fitted, (hypothesis, chi2) each, all really there."""
+    fits_made = [Tried(h, SimpleNamespace(total=total, variant=Variant(()))) for h, total in tried]
+    return Choice(
+        hypothesis=hypothesis,
+        fitted=SimpleNamespace(total=1e3, variant=Variant(())),
+        after=None,
+        rivals=[[] for _ in hypothesis.starts],
+        own_gains=own_gains,
+        tried=fits_made,
+    )
+
+
 def test_what_was_fitted_and_is_probable_stands_in_the_set():
     """A wheel radius that chi2 rules out by its form, with 17 %, beside an encoder's scale."""
     motor, wind = Hypothesis((MOTOR,), 500.0, 490.0), Hypothesis((WIND,), 400.0, 390.0)
-    bare = Variant(())
-    tried = [Tried(h, SimpleNamespace(total=1e3, variant=bare)) for h in (ONE, motor, wind)]
-    choice = SimpleNamespace(hypothesis=ONE, rivals=[[]], tried=tried)
-    with mock.patch.object(rivals, "replace", lambda _, rivals: rivals):
-        found = rivals.with_probable(choice, {"rolling": 0.6, "motor": 0.17, "wind": 0.09})
-        assert [[r.hypothesis.keys for r in group] for group in found] == [[("motor",)]]
-        choice.rivals = [[tried[1]]]  # it is there once
-        assert rivals.with_probable(choice, {"motor": 0.17}) == [[tried[1]]]
+    choice = chosen(ONE, [(h, 1e3) for h in (ONE, motor, wind)], [500.0])
+    probability = {"rolling": 0.8, "motor": 0.17, "wind": 0.03}
+    found = rivals.with_probable(choice, probability)
+    assert [[r.hypothesis.keys for r in group] for group in found.rivals] == [[("motor",)]]
+    assert not found.others
+    # it is there once
+    assert rivals.with_probable(found, probability).rivals == found.rivals
+
+
+def test_two_effects_may_stand_in_the_place_of_one():
+    """Rolling resistance and the drag of the air pass for the friction of a bearing."""
+    pair = Hypothesis((MOTOR, WIND), 490.0, 470.0)
+    choice = chosen(ONE, [(ONE, 1e3), (pair, 1020.0), (pair, 1010.0)], [500.0])
+    found = rivals.with_probable(choice, {"rolling": 0.9, pair.name: 0.07, "outside": 0.03})
+    assert [t.fitted.total for t in found.others] == [1010.0]  # the better fit, once
+    ((without, instead, rival),) = rivals.exchanged(found)
+    assert (without, instead) == ([ROLLING], [MOTOR, WIND])
+    assert rival is found.others[0]
+    assert decide._alternatives(found, once=False) == [["rolling", "motor+wind"]]
+
+
+@pytest.mark.parametrize("cannot_be", [False, True])
+def test_what_linear_algebra_finds_probable_is_fitted_before_the_verdict(cannot_be, monkeypatch):
+    """The friction of a bearing closed the gap, so no pair had been fitted."""
+    motor, wind = Hypothesis((MOTOR,), 480.0, 470.0), Hypothesis((WIND,), 400.0, 390.0)
+    pair = Hypothesis((MOTOR, WIND), 490.0, 470.0)
+    known = {"rolling": 0.7, "motor": 0.14, pair.name: 0.12, "wind": 0.01, "outside": 0.03}
+    monkeypatch.setattr(probable, "probabilities", lambda *_: known)
+    monkeypatch.setattr(hypotheses, "singles", lambda *_: [ONE, motor, wind])
+    monkeypatch.setattr(hypotheses, "pairs", lambda *_: [BOTH, pair])
+    choice = chosen(ONE, [(ONE, 1e3), (motor, 1010.0)], [500.0])
+    asked = []
+    looking = SimpleNamespace(
+        base=SimpleNamespace(reduced=None, starts=()),
+        tried=choice.tried,
+        fit=lambda h, best: asked.append(h.name) or (None if cannot_be else Tried(h, best.fitted)),
+    )
+    monkeypatch.setattr(probable, "better_of", lambda fits, chosen, found: found)
+    found = probable.better_than(looking, choice)
+    assert asked == [pair.name]  # the motor was fitted before, and wind is not probable
+    assert [(t.hypothesis, by) for t, by in found] == ([] if cannot_be else [(pair, 500.0)])
+
+
+def test_one_effect_may_stand_in_the_place_of_two_and_nothing_in_that_of_one():
+    wind = Hypothesis((WIND,), 490.0, 470.0)
+    choice = chosen(BOTH, [(BOTH, 1e3), (wind, 1020.0), (ONE, 1030.0)], [400.0, 30.0])
+    found = rivals.with_probable(choice, {BOTH.name: 0.7, "wind": 0.2, "rolling": 0.1})
+    sets = decide._alternatives(found, once=False)
+    assert sorted(sets) == [["motor", "none"], ["rolling+motor", "wind"]]
+    assert found.brought == {"rolling": 400.0, "motor": 30.0}
 
 
 @pytest.mark.parametrize("alone", [None, 1500.0])

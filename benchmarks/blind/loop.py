@@ -22,6 +22,7 @@ from generator import SEAL, Case, Manoeuvre, add_trial, make, unseal
 from runner import diagnosed, parser, resumed
 from table import counted, kept, markdown, named, truth, wrong
 
+from mjchair.diagnosis.explain.rivals import exchanged
 from mjchair.diagnosis.fit.nonlinear import Fitted, refit
 from mjchair.diagnosis.next_experiment import manoeuvres
 from mjchair.diagnosis.next_experiment.design import Plan
@@ -100,7 +101,7 @@ def shown(plan: Plan, before: Stages, after: Stages) -> list[float | None]:
     None: a rival that could not be fitted again. A force outside the library has no fit.
     """
     choice = before.choice
-    rivals = [r.fitted for group in choice.rivals for r in group]
+    rivals = [rival.fitted for *_, rival in exchanged(choice)]
     if (rivals and len(plan.rivals) > len(rivals)) or plan.rivals == ("no further effect",):
         rivals.append(before.base.plain)  # beside something that happened once
     out: list[float | None] = []

@@ -42,7 +42,8 @@ def returned(line: dict) -> set[str]:
     """All names that a verdict does not exclude."""
     if line["verdict"] not in ("named", "ambiguous"):
         return set()
-    return {e["name"] for e in line["effects"]} | {n for g in line["alternatives"] for n in g}
+    rivals = {n for g in line["alternatives"] for names in g for n in names.split("+")}
+    return {e["name"] for e in line["effects"]} | rivals
 
 
 def first(line: dict) -> str:

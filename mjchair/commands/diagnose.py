@@ -173,7 +173,7 @@ def _interrupted(kept: Path) -> bool:
 def _line(found: Diagnosis) -> str:
     """Verdict, effects and gap on one line."""
     names = ", ".join(e.name for e in found.effects) or "no effect"
-    sets = " / ".join(" or ".join(group) for group in found.alternatives)
+    sets = " / ".join(" or ".join(group).replace("+", " with ") for group in found.alternatives)
     gap = found.gap
     assert gap is not None
     return (

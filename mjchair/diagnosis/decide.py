@@ -7,7 +7,7 @@ themselves stand in rules.py; here their numbers are gathered.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from mjchair.diagnosis import rules
 from mjchair.diagnosis.evidence import evidence, missing_forces
 from mjchair.diagnosis.explain import event, hypotheses, missing_force
 from mjchair.diagnosis.explain.calibration import NONE
+from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Choice, closure
 from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.explain.gap import Gap, forces_left
@@ -30,7 +31,7 @@ from mjchair.diagnosis.explain.left_out import (
     slow_part,
 )
 from mjchair.diagnosis.explain.probability import of_any, of_effects, probabilities, with_gap
-from mjchair.diagnosis.explain.rivals import with_probable
+from mjchair.diagnosis.explain.rivals import exchanged, with_probable
 from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import ParameterId
@@ -164,8 +165,8 @@ def _sigmas(choice: Choice) -> tuple[float, ...]:
 
 def _standing_keys(choice: Choice) -> set[str]:
     """Keys of the chosen effects and of all that could stand in their places."""
-    rivals = {key for group in choice.rivals for r in group for key in r.hypothesis.keys}
-    return {*choice.hypothesis.keys, *rivals}
+    instead = {s.effect.key for _, starts, _ in exchanged(choice) for s in starts}
+    return {*choice.hypothesis.keys, *instead}
 
 
 def _once(base: Base, choice: Choice, held: rules.HeldOut | None) -> bool:
@@ -196,13 +197,12 @@ def _plan(base: Base, choice: Choice, once: bool) -> tuple[Plan | None, list[str
       once: whether something that happened once fits about as well.
     """
     chosen = choice.fitted
-    rivals = [
-        (r.fitted, own)
-        for group, own in zip(choice.rivals, choice.own_gains, strict=True)
-        for r in group
-    ]
-    near = [r for r, _ in rivals]
-    needed = [rules.to_rule_out(behind=r.total - chosen.total, gain=own) for r, own in rivals]
+    near, needed = [], []
+    for without, _, rival in exchanged(choice):
+        behind = rival.fitted.total - chosen.total
+        brought = sum(choice.brought[s.effect.key] for s in without)
+        near.append(rival.fitted)
+        needed.append(rules.to_rule_out(behind=behind, gain=brought))
     if once:
         near.append(base.plain)
         needed.append(rules.to_show_again(event=event.largest(base), gain=choice.hypothesis.gain))
@@ -237,21 +237,26 @@ def _following(
 def _alternatives(choice: Choice, once: bool) -> list[list[str]]:
     """For every effect, the names that could stand in its place, itself first.
 
+    Effects that only go together, on either side, are one name.
+
     Args:
       once: whether something that happened once fits about as well.
     """
-    out = []
-    for start, rivals in zip(choice.hypothesis.starts, choice.rivals, strict=True):
-        keys = {s.effect.key for s in choice.hypothesis.starts}
-        new = [
-            s.effect.name for r in rivals for s in r.hypothesis.starts if s.effect.key not in keys
-        ]
-        names = list(dict.fromkeys([start.effect.name, *new]))
-        if len(names) > 1:
-            out.append(names)
+    sets: dict[str, list[str]] = {}
+    for without, instead, _ in exchanged(choice):
+        own, other = _joined(without), _joined(instead)
+        names = sets.setdefault(own, [own])
+        if other not in names:
+            names.append(other)
+    out = list(sets.values())
     if once:
         out.append([*(s.effect.name for s in choice.hypothesis.starts), EVENT])
     return out
+
+
+def _joined(starts: Sequence[Start]) -> str:
+    """Names of effects as in `Diagnosis.alternatives`: several joined by "+", or none."""
+    return "+".join(s.effect.name for s in starts) or NONE
 
 
 def _shown(parameter: Parameter, value: float) -> float:

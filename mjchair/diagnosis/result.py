@@ -316,7 +316,8 @@ class Diagnosis:
 
     Attributes:
       verdict: what is said. effects: in the model now, most important first.
-      alternatives: sets of effects that these data cannot tell apart, one set for each effect.
+      alternatives: sets of effects that these data cannot tell apart, one set for each effect,
+        itself first; "a+b" is two that go together, and "none" that nothing stands there.
       candidates: every effect as screened. gap: rms of the whitened residual before and after.
       where: where the disagreement is. next_experiment: what would decide.
       notes: what was assumed or noticed. drivers: what the force that is missing goes with.

@@ -23,6 +23,7 @@ CARRIED = 0.5  # share of the excess on held-out trials that it closes there
 PROBABLE = 0.95  # probability of a named effect
 FAR = 2.5  # standard deviations: what is only roughly known and was moved as far is measured
 SHOWN = 0.1  # probability of what is shown as a rival whatever its chi2
+LISTED = 0.02  # and of what is shown where more probable ones together have less than PROBABLE
 LIKELY = 0.5  # probability of an answer to a residual that is no more than noise
 HELD = 10.0  # chi2 that it must bring on runs that it was not fitted to
 SIGMAS = 4.0  # standard errors of a parameter away from neutral
@@ -492,9 +493,15 @@ def is_far(by: float) -> bool:
     return abs(by) >= FAR
 
 
-def is_shown(probability: float) -> bool:
-    """Whether a hypothesis is probable enough to be shown as a rival, whatever its chi2."""
-    return probability >= SHOWN
+def is_shown(probability: float, before: float = 1.0) -> bool:
+    """Whether a hypothesis is probable enough to be shown as a rival, whatever its chi2.
+
+    What is shown has a probability of PROBABLE together, as far as that takes no tiny ones.
+
+    Args:
+      before: probability of all that are more probable.
+    """
+    return probability >= SHOWN or (probability >= LISTED and before < PROBABLE)
 
 
 def stays_a_rival(*, behind: float, gain: float, errors: float, beyond_bound: bool) -> bool:

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+from mjchair.diagnosis.explain.calibration import NONE
 from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.fit.process import Part
 from mjchair.diagnosis.next_experiment.wording import plain
@@ -46,7 +47,7 @@ def missing(diagnosis: Diagnosis) -> str:
 
 def _undecided(diagnosis: Diagnosis) -> str:
     """What is missing whichever it is, and what these runs cannot tell apart."""
-    sets = "; and ".join(" or ".join(bold(n) for n in s) for s in diagnosis.alternatives)
+    sets = _sets(diagnosis.alternatives)
     doubt = (
         f"{sets}, which these runs cannot tell apart"
         if sets
@@ -58,6 +59,16 @@ def _undecided(diagnosis: Diagnosis) -> str:
     if not known or not others:
         return f"What is missing is {doubt}; {chosen}."
     return f"{_capital(found_words(known))}. Besides, what is missing is {doubt}; {chosen}."
+
+
+def _sets(alternatives: Sequence[Sequence[str]]) -> str:
+    """What could stand in the place of each effect, and then in that of several together."""
+    single = [s for s in alternatives if "+" not in s[0]]
+    several = [s for s in alternatives if "+" in s[0]]
+    said = ["; and ".join(" or ".join(map(together, s)) for s in single)] if single else []
+    for own, *others in several:
+        said.append(f"{' or '.join(map(together, others))} in the place of {together(own)}")
+    return "; or ".join(said)
 
 
 def found_words(effects: Sequence[NamedEffect]) -> str:
@@ -91,7 +102,7 @@ def _capital(text: str) -> str:
 
 def certain(diagnosis: Diagnosis) -> list[NamedEffect]:
     """Effects that are in nearly every explanation, and for which no other can stand."""
-    open_ones = {name for names in diagnosis.alternatives for name in names}
+    open_ones = {n for s in diagnosis.alternatives for names in s for n in names.split("+")}
     holding = {
         e.key: sum(p for name, p in diagnosis.probability.items() if e.key in name.split("+"))
         for e in diagnosis.effects
@@ -313,8 +324,7 @@ def driver_words(diagnosis: Diagnosis) -> str:
 def alike_words(diagnosis: Diagnosis) -> str:
     """Which effects these data cannot tell apart."""
     if diagnosis.alternatives:
-        sets = "; ".join(" / ".join(bold(n) for n in s) for s in diagnosis.alternatives)
-        return f"Not to be told apart by these data: {sets}."
+        return f"Not to be told apart by these data: {_sets(diagnosis.alternatives)}."
     if diagnosis.verdict == Verdict.NAMED:
         return "All other explanations together have a probability of 5 % at most."
     return ""
@@ -438,6 +448,11 @@ def plain_name(name: str) -> str:
 def bold(name: str) -> str:
     """A name as words, to be shown bold."""
     return f"**{plain_name(name)}**"
+
+
+def together(names: str) -> str:
+    """One of the alternatives as words, bold: an effect, several that go together, or nothing."""
+    return "nothing" if names == NONE else " with ".join(map(bold, names.split("+")))
 
 
 def chance(p: float) -> str:

@@ -38,6 +38,7 @@ class Choice:
       hypothesis: effects. fitted: their fit, everything made anew around it.
       after: the gap that they leave.
       rivals: for every effect, what could stand in its place, best first.
+      others: what could stand in the place of several, or be several in the place of some.
       own_gains: of every effect, the chi2 that it brings beside the others.
       tried: every fit that was made.
       dropped: a line for each hypothesis that this chair cannot have.
@@ -48,8 +49,15 @@ class Choice:
     after: Gap
     rivals: list[list[Tried]]
     own_gains: list[float]
+    others: list[Tried] = field(default_factory=list)
     tried: list[Tried] = field(default_factory=list)
     dropped: list[str] = field(default_factory=list)
+
+    @property
+    def brought(self) -> dict[str, float]:
+        """Key of every effect -> the chi2 that it brings beside the others."""
+        keys = (s.effect.key for s in self.hypothesis.starts)
+        return dict(zip(keys, self.own_gains, strict=True))
 
 
 def is_there(fitted: Fitted) -> bool:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import calibration, hypotheses
 from mjchair.diagnosis.explain.calibration import NONE, OUTSIDE, Chosen, Weight
 from mjchair.diagnosis.explain.candidates import Start
@@ -81,6 +82,24 @@ def of_any(probability: Mapping[str, float], keys: Iterable[str]) -> float:
     """Probability that at least one of these effects is there."""
     wanted = set(keys)
     return sum(p for name, p in probability.items() if wanted & set(name.split("+")))
+
+
+def shown(probability: Mapping[str, float], chosen: str) -> set[str]:
+    """The hypotheses that are probable enough to stand beside the chosen one, by their names.
+
+    Those that hold the chosen effects and more count as the choice.
+
+    Args:
+      probability: of hypotheses. chosen: name of the chosen one.
+    """
+    others = {n: p for n, p in probability.items() if not calibration.holds(n, chosen)}
+    before = sum(probability.values()) - sum(others.values())
+    out = set()
+    for name, p in sorted(others.items(), key=lambda item: -item[1]):
+        if rules.is_shown(p, before):
+            out.add(name)
+        before += p
+    return out
 
 
 def weights(base: Base, choice: Choice | None) -> dict[str, Weight]:

@@ -19,6 +19,7 @@ from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Choice, Tried, is_there
 from mjchair.diagnosis.explain.fits import Fits, believable
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
+from mjchair.diagnosis.explain.probability import shown
 from mjchair.diagnosis.explain.screening import gain
 from mjchair.diagnosis.explain.shortlist import with_one_more
 
@@ -35,7 +36,10 @@ def against_rivals(fits: Fits, chosen: Tried) -> tuple[Tried, list[list[Tried]]]
     """
     rivals = rivals_of(fits, chosen)
     for _ in range(SWAPS):
-        better = _better_rival(fits, chosen, rivals)
+        own = own_gains(fits, chosen)
+        better = better_of(
+            fits, chosen, [(r, g) for group, g in zip(rivals, own, strict=True) for r in group]
+        )
         if better is None:
             break
         chosen = without_needless(fits, better)
@@ -43,14 +47,14 @@ def against_rivals(fits: Fits, chosen: Tried) -> tuple[Tried, list[list[Tried]]]
     return chosen, rivals
 
 
-def _better_rival(fits: Fits, chosen: Tried, rivals: Sequence[Sequence[Tried]]) -> Tried | None:
+def better_of(fits: Fits, chosen: Tried, rivals: Sequence[tuple[Tried, float]]) -> Tried | None:
     """The best of the rivals that are better than the choice; None: none is.
 
     Columns that were made without the effects are wrong by some chi2, more for one hypothesis
     than for another, so of those that are near everything is made anew.
 
     Args:
-      rivals: of every effect of the choice.
+      rivals: each with the chi2 that the effects bring in whose place it would stand.
     """
 
     def ahead(rival: Tried, own: float, anew: bool) -> float:
@@ -62,9 +66,7 @@ def _better_rival(fits: Fits, chosen: Tried, rivals: Sequence[Sequence[Tried]]) 
         more_common = rival.hypothesis.prior - chosen.hypothesis.prior
         return rules.counts(mine - theirs, gain=own) + more_common
 
-    own = own_gains(fits, chosen)
-    pairs = [(r, g) for group, g in zip(rivals, own, strict=True) for r in group]
-    near = [(r, g) for r, g in pairs if believable(r.fitted) and ahead(r, g, False) > -NEAR]
+    near = [(r, g) for r, g in rivals if believable(r.fitted) and ahead(r, g, False) > -NEAR]
     found = [(ahead(r, g, True), r) for r, g in near]
     best, rival = max(found, key=itemgetter(0), default=(0.0, None))
     return rival if best > 0.0 else None
@@ -140,7 +142,7 @@ def _in_place_of(
     Args:
       but: keys of hypotheses that are left out.
     """
-    own, seen = start.effect.key, [set(keys) for keys in but]
+    own = start.effect.key
     stay = set(chosen.keys) - {own}
     fits = [
         t
@@ -148,9 +150,15 @@ def _in_place_of(
         if len(t.hypothesis.starts) == len(chosen.starts)
         and stay < set(t.hypothesis.keys)
         and own not in t.hypothesis.keys
-        and set(t.hypothesis.keys) not in seen
     ]
-    best = {frozenset(t.hypothesis.keys): t for t in sorted(fits, key=lambda t: -t.price)}
+    return _best_of_each(fits, but)
+
+
+def _best_of_each(tried: Sequence[Tried], but: Collection[Sequence[str]]) -> list[Tried]:
+    """The best fit of each hypothesis, but for those with these keys."""
+    seen = [set(keys) for keys in but]
+    fits = [t for t in tried if set(t.hypothesis.keys) not in seen]
+    best = {t.hypothesis.name: t for t in sorted(fits, key=lambda t: -t.price)}
     return list(best.values())
 
 
@@ -162,16 +170,28 @@ def with_probable(choice: Choice, probability: Mapping[str, float]) -> Choice:
     Args:
       probability: of hypotheses, by their keys joined by "+".
     """
-    likely = [
-        t
-        for t in choice.tried
-        if rules.is_shown(probability.get(t.hypothesis.name, 0.0)) and is_there(t.fitted)
-    ]
+    chosen = choice.hypothesis
+    worth = shown(probability, chosen.name)
+    likely = [t for t in choice.tried if t.hypothesis.name in worth and is_there(t.fitted)]
     out = []
-    for start, rivals in zip(choice.hypothesis.starts, choice.rivals, strict=True):
+    for start, rivals in zip(chosen.starts, choice.rivals, strict=True):
         known = [r.hypothesis.keys for r in rivals]
-        out.append([*rivals, *_in_place_of(likely, choice.hypothesis, start, known)])
-    return replace(choice, rivals=out)
+        out.append([*rivals, *_in_place_of(likely, chosen, start, known)])
+    known = [r.hypothesis.keys for group in out for r in group]
+    return replace(choice, rivals=out, others=_best_of_each(likely, known))
+
+
+def exchanged(choice: Choice) -> list[tuple[list[Start], list[Start], Tried]]:
+    """Every rival, with the chosen effects that it does without and those that it has instead."""
+    own = choice.hypothesis
+    return [
+        (
+            [s for s in own.starts if s.effect.key not in rival.hypothesis.keys],
+            [s for s in rival.hypothesis.starts if s.effect.key not in own.keys],
+            rival,
+        )
+        for rival in (*(r for group in choice.rivals for r in group), *choice.others)
+    ]
 
 
 def _not_ruled_out(rival: Tried, chosen: Tried, brought: float) -> bool:

@@ -6,14 +6,18 @@ rules that decide stand in rules.py; a hypothesis that this chair cannot have is
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain.backward_elimination import without_needless
 from mjchair.diagnosis.explain.choice import Choice, Tried
 from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.forward_selection import grown
 from mjchair.diagnosis.explain.null_ensemble import confirmed
+from mjchair.diagnosis.explain.probable import better_than
 from mjchair.diagnosis.explain.rivals import against_rivals, own_gains
 from mjchair.diagnosis.explain.shortlist import freed
+from mjchair.diagnosis.fit.nonlinear import Fitted
 
 
 def choose(fits: Fits) -> Choice | None:
@@ -26,13 +30,25 @@ def choose(fits: Fits) -> Choice | None:
     if here is None:
         return None
     best, rivals = against_rivals(fits, without_needless(fits, here[0]))
+    better = better_than(fits, _choice(fits, best, fits.anew(best), rivals))
+    if better is not None:
+        best, rivals = against_rivals(fits, without_needless(fits, better))
     best = _with_both_sides(fits, best)
     fits.say("the last fit, with everything made anew around it")
-    fitted = fits.last_fit(best)
+    found = _choice(fits, best, fits.last_fit(best), rivals)
+    return replace(found, after=confirmed(fits.base, found.fitted, found.after))
+
+
+def _choice(fits: Fits, best: Tried, fitted: Fitted, rivals: list[list[Tried]]) -> Choice:
+    """The best hypothesis as the choice.
+
+    Args:
+      fitted: its fit with everything made anew around it. rivals: of each of its effects.
+    """
     return Choice(
         hypothesis=best.hypothesis,
         fitted=fitted,
-        after=confirmed(fits.base, fitted, fits.gap_after(fitted)),
+        after=fits.gap_after(fitted),
         rivals=rivals,
         own_gains=own_gains(fits, best),
         tried=fits.tried,
