@@ -92,10 +92,14 @@ def prior(simulator: WindowSimulator, window: int, state: State) -> Array:
         spread[3:5] = STANDING
     # nothing tells where an unseen position is; what its column answers is rounding, and a large
     # residual would be laid on it
-    spread[:2][~first_state.observed(simulator.study.runs[simulator.windows[window].run])[:2]] = (
-        1e-6
-    )
+    spread[~_tells(simulator, window)] = 1e-6
     return spread
+
+
+def _tells(simulator: WindowSimulator, window: int) -> NDArray[np.bool_]:
+    """Which of the slow state a window may tell: all but positions that no channel sees, (7,)."""
+    seen = first_state.observed(simulator.study.runs[simulator.windows[window].run])
+    return seen | (np.arange(len(SLOW)) >= 2)
 
 
 def _stands(simulator: WindowSimulator, window: int, state: State) -> bool:
@@ -291,21 +295,27 @@ def _answers(
 ) -> dict[int, Array]:
     """How windows answer to their slow states: (rows, channels, 7) each, times chair.STEPS.
 
+    What a window cannot tell is not simulated, and answers with zero.
+
     Args:
       share: of STEPS, by which the states are moved.
     """
     jobs = []
     for i, state in states.items():
-        moved = [simulator.chair.moved(state, step) for step in share * np.diag(STEPS)]
+        steps = share * np.diag(STEPS)[_tells(simulator, i)]
+        moved = [simulator.chair.moved(state, step) for step in steps]
         jobs += [Job(model, simulator.windows[i], s) for s in (state, *moved)]
     outcomes = iter(simulator.run(jobs))
     out = {}
     for i in states:
         w = simulator.windows[i]
+        told = np.flatnonzero(_tells(simulator, i))
         base, *seen = (
-            errors.applied(simulator, w, next(outcomes).predicted) for _ in range(1 + len(SLOW))
+            errors.applied(simulator, w, next(outcomes).predicted) for _ in range(1 + told.size)
         )
-        out[i] = np.stack([(y - base) / share for y in seen], axis=2)
+        out[i] = np.zeros((*base.shape, len(SLOW)))
+        for k, y in zip(told, seen, strict=True):
+            out[i][..., k] = (y - base) / share
     return out
 
 
