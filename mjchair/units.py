@@ -41,10 +41,10 @@ _WITH_UNIT = re.compile(r"^(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?$")
 _QUANTITY = re.compile(r"^(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>.*)$")
 
 
-def split_header(text: str) -> tuple[str, float]:
-    """The name and the factor to SI of a column such as ``left_wheel_speed [deg/s]``.
+def split_header(text: str) -> tuple[str, str]:
+    """The name and the unit of a column such as ``left_wheel_speed [deg/s]``.
 
-    A name without brackets is in SI already.
+    A name without brackets is in SI already, and its unit is empty.
 
     Raises:
       MjchairError: an empty name, or a unit that is not known.
@@ -54,10 +54,15 @@ def split_header(text: str) -> tuple[str, float]:
         raise MjchairError(f"column {text!r}; a column is a name, or a name [unit]")
     unit = match["unit"]
     if unit is None:
-        return match["name"], 1.0
+        return match["name"], ""
     if unit.strip() not in UNITS:
         raise MjchairError(f"column {text!r}: unknown unit {unit!r}" + nearest(unit, UNITS))
-    return match["name"], UNITS[unit.strip()][1]
+    return match["name"], unit.strip()
+
+
+def factor(unit: str) -> float:
+    """What a number in a unit of UNITS is multiplied by to be in SI; 1 for no unit."""
+    return UNITS[unit][1] if unit else 1.0
 
 
 def grade(text: str) -> float:

@@ -13,7 +13,7 @@ import mjchair
 from mjchair.diagnosis.data.study_file import ProcessEntry, StudyEntry
 from mjchair.measurement import samples
 from mjchair.toml_file import read_toml
-from mjchair.units import split_header
+from mjchair.units import factor, split_header
 
 PAGE = (Path(__file__).parents[1] / "docs" / "study_file.md").read_text()
 EXAMPLES = re.findall(r"^```toml\n(.*?)^```", PAGE, re.M | re.S)
@@ -36,7 +36,7 @@ def values(name, k):
 
 def write_table(path, columns, k):
     """A table with columns such as "imu_gyro.z [deg/s]"."""
-    sizes = [split_header(c) for c in columns]
+    sizes = [(name, factor(unit)) for name, unit in map(split_header, columns)]
     table = [TIME / sizes[0][1], *(values(name, k) / size for name, size in sizes[1:])]
     np.savetxt(path, np.column_stack(table), "%.9g", ",", header=",".join(columns), comments="")
 

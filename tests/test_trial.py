@@ -4,6 +4,7 @@ import pytest
 
 from mjchair.errors import MjchairError
 from mjchair.measurement.trial import read_trial
+from mjchair.simulation.table import read_table
 
 XML = """
 <mujoco>
@@ -93,6 +94,31 @@ def test_files_of_one_trial_share_a_clock_and_keep_their_rates_and_units(tmp_pat
     assert (trial.inputs.time == 0.02 * np.arange(50)).all()  # its own: no sample is missing
     assert (trial.inputs.controls["left_wheel"] == np.arange(50)).all()
     assert trial.inputs.at("left_wheel", 0.03) == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize(
+    ("column", "line"),
+    [
+        (
+            "left_wheel_speed [km/h]",
+            "left_wheel_speed is in km/h; it must be in rad/s or deg/s or rpm; divide what its rim "
+            "rolls by the wheel's radius",
+        ),
+        ("imu_gyro.z [m/s^2]", "imu_gyro.z is in m/s^2; it must be in rad/s or deg/s or rpm"),
+        ("left_wheel [deg/s]", "left_wheel is in deg/s; it must be in N m or Nm or N mm"),
+        ("rider_motion [deg]", "rider_motion is in deg; it must be in m or mm or cm or in"),
+    ],
+)
+def test_a_unit_of_something_else_is_refused(column, line, tmp_path, model):
+    path = write(tmp_path / "a.csv", f"time,imu_gyro.x,{column}\n0,1,1\n1,1,1\n")
+    with pytest.raises(MjchairError) as error:
+        read_trial(path, model)
+    assert line in str(error.value)
+
+
+def test_the_time_of_a_table_is_a_time(tmp_path):
+    with pytest.raises(MjchairError, match="time is in deg; it must be in s or ms"):
+        read_table(write(tmp_path / "a.csv", "time [deg],x\n0,1\n1,1\n"))
 
 
 def test_inputs_of_two_files_are_each_straight_between_their_own_samples(tmp_path, model):

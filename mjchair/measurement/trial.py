@@ -18,10 +18,10 @@ import numpy as np
 from mjchair.errors import MjchairError, nearest
 from mjchair.model.wheels import base_name
 from mjchair.rider.anatomy import JOINT_NAMES
-from mjchair.simulation.channels import channels
+from mjchair.simulation.channels import channel_units, channels
 from mjchair.simulation.frozen import FrozenRecord
-from mjchair.simulation.inputs import OTHER_COLUMNS, Inputs, drivable
-from mjchair.simulation.table import Array, Table, leave_out, merged, read_table
+from mjchair.simulation.inputs import OTHER_COLUMNS, Inputs, control_units, drivable
+from mjchair.simulation.table import Array, Table, check_units, leave_out, merged, read_table
 
 MOTION = "rider_motion"
 
@@ -84,6 +84,7 @@ def read_trial(
 def trial_from_table(table: Table, model: mujoco.MjModel, name: str, hold: bool = False) -> Trial:
     """A trial of a table; see `read_trial`."""
     sensed, driven = _sensed(model), _driven(model)
+    check_units(table, {**channel_units(model), **control_units(model), **OTHER_COLUMNS})
     moving = bool(driven & set(JOINT_NAMES))  # then its joints say where its mass is
     measured, controls, other = {}, {}, {}
     for column, values in table.columns.items():

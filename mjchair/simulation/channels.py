@@ -80,6 +80,12 @@ def channels(model: mujoco.MjModel) -> list[Channel]:
     return listed
 
 
+def channel_units(model: mujoco.MjModel) -> dict[str, str]:
+    """SI unit of every channel, by its name with and without prefix; "?" where it is not known."""
+    units = {c.name: c.unit for c in channels(model)}
+    return units | {base_name(name): unit for name, unit in units.items()}
+
+
 def tire_place(model: mujoco.MjModel, wheel: str, component: str) -> int:
     """Index in `sensordata` of a component of a wheel's tire sensor.
 

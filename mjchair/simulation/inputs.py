@@ -20,7 +20,14 @@ from mjchair.model.wheels import base_name
 from mjchair.rider.anatomy import JOINT_NAMES
 from mjchair.simulation import names
 from mjchair.simulation.frozen import FrozenRecord
-from mjchair.simulation.table import Array, check_time, frozen, leave_out, read_table
+from mjchair.simulation.table import (
+    Array,
+    check_time,
+    check_units,
+    frozen,
+    leave_out,
+    read_table,
+)
 
 # Period of a push cycle, s, and the share of it in which the hand is on the rim, 1: overground
 # pushing at a self-chosen speed near 1 m/s (period from the SmartWheel recording in data/;
@@ -187,6 +194,19 @@ def drivable(model: mujoco.MjModel) -> list[str]:
     return [n for i, n in enumerate(names.actuators(model)) if model.actuator_dyntype[i] != user]
 
 
+def control_units(model: mujoco.MjModel) -> dict[str, str]:
+    """SI unit of every actuator that turns a hinge and of joysticks, with and without prefix."""
+    units = {}
+    for i, name in enumerate(names.actuators(model)):
+        on_joint = model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_JOINT
+        hinge = int(mujoco.mjtJoint.mjJNT_HINGE)
+        if on_joint and model.jnt_type[model.actuator_trnid[i, 0]] == hinge:
+            units[name] = "rad" if is_position(model, i) else "N m"
+        if base_name(name) in JOYSTICK:
+            units[name] = "1"
+    return units | {base_name(name): unit for name, unit in units.items()}
+
+
 def constant(controls: Mapping[str, float], duration: float) -> Inputs:
     """Controls that stay the same from 0 to `duration` (s).
 
@@ -263,6 +283,7 @@ def read_inputs(path: str | os.PathLike[str], model: mujoco.MjModel, hold: bool 
     table = read_table(path)
     driven = {base_name(name) for name in drivable(model)} | set(drivable(model))
     sensed = {base_name(name) for name in names.sensors(model)} | set(names.sensors(model))
+    check_units(table, {**control_units(model), **OTHER_COLUMNS})
     controls = {name: values for name, values in table.columns.items() if name in driven}
     unknown = [
         name
@@ -317,7 +338,9 @@ def as_inputs(
     return read_inputs(given, model)
 
 
-# Columns of a measured run that are neither an actuator nor a sensor: forward displacement of the
-# rider's centre of mass in the chair frame (m), speed (m/s) and heading in the laboratory (rad) of
-# the chair as measured by markers.
-OTHER_COLUMNS = frozenset({"rider_motion", "chair_speed", "chair_heading"})
+# Columns of a measured run that are neither an actuator nor a sensor, with their units: forward
+# displacement of the rider's centre of mass in the chair frame, speed and heading in the laboratory
+# of the chair as measured by markers.
+OTHER_COLUMNS = MappingProxyType(
+    {"rider_motion": "m", "chair_speed": "m/s", "chair_heading": "rad"}
+)

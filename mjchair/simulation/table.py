@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
 from types import MappingProxyType
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from mjchair.csv_table import read_columns
 from mjchair.errors import MjchairError, closest, nearest, note
 from mjchair.simulation.frozen import FrozenRecord
-from mjchair.units import split_header
+from mjchair.units import UNITS, factor, split_header, units_of
 
 Array = NDArray[np.float64]
 
@@ -35,6 +35,7 @@ class Table(FrozenRecord):
       time: (n,), s, strictly increasing.
       columns: name -> (n,), NaN where a sample is missing.
       source: the file, for error messages.
+      units: name -> unit in which the file had a column, where its header says so.
 
     Raises:
       MjchairError: no samples, time not finite or not strictly increasing, a column of another
@@ -44,6 +45,7 @@ class Table(FrozenRecord):
     time: Array
     columns: Mapping[str, Array]
     source: str = "table"
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check them."""
@@ -152,7 +154,29 @@ def merged(tables: Sequence[Table]) -> Table:
         for name, values in table.columns.items():
             columns[name] = np.full(time.size, np.nan)
             columns[name][rows] = values
-    return Table(time, columns, ", ".join(table.source for table in tables))
+    units = {name: unit for table in tables for name, unit in table.units.items()}
+    return Table(time, columns, ", ".join(table.source for table in tables), units)
+
+
+def check_units(table: Table, known: Mapping[str, str]) -> None:
+    """Refuse columns in a unit of something else, such as a wheel's turning in km/h.
+
+    Args:
+      known: column -> its SI unit; of a column that is not among these, nothing is known.
+
+    Raises:
+      MjchairError: naming the column and the units that it may have.
+    """
+    for name, unit in table.units.items():
+        si = known.get(name, "?")
+        options = units_of(si)
+        if not options or unit in options:
+            continue
+        along = {"m": "rad", "m/s": "rad/s"}.get(UNITS[unit][0]) == si
+        raise MjchairError(
+            f"{table.source}: {name} is in {unit}; it must be in {' or '.join(options)}"
+            + ("; divide what its rim rolls by the wheel's radius" if along else "")
+        )
 
 
 def _check_together(earlier: Table, later: Table) -> None:
@@ -223,6 +247,7 @@ def _table(header: list[str], data: Array, source: str) -> Table:
     except MjchairError as error:
         raise MjchairError(f"{source}: {error}") from None
     names = [name for name, _ in columns]
+    units = {name: unit for name, unit in columns if unit}
     if not names or names[0] != "time":
         raise MjchairError(f"{source}: the first column is {(names or [''])[0]!r}; it must be time")
     if "[" not in header[0]:
@@ -230,8 +255,10 @@ def _table(header: list[str], data: Array, source: str) -> Table:
     twice = {name for name in names if names.count(name) > 1}
     if twice:
         raise MjchairError(f"{source}: column {min(twice)!r} is there twice; names are unique")
-    scaled = {name: data[:, i] * columns[i][1] for i, name in enumerate(names)}
-    return Table(scaled.pop("time"), scaled, source)
+    scaled = {name: data[:, i] * factor(unit) for i, (name, unit) in enumerate(columns)}
+    table = Table(scaled.pop("time"), scaled, source, units)
+    check_units(table, {"time": "s"})
+    return table
 
 
 def _read_csv(path: Path) -> tuple[list[str], Array]:

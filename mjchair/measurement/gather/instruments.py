@@ -6,7 +6,7 @@ a wheel, because one file may roll backwards or hold no push.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -19,9 +19,11 @@ from mjchair.measurement import imu, smartwheel, table_wheels
 from mjchair.measurement.exports import read_export
 from mjchair.measurement.gather.sources import Source
 from mjchair.measurement.notes import Detail, about
+from mjchair.measurement.sensors import rolls, sensor
 from mjchair.measurement.smartwheel import Orientation, PushRim
 from mjchair.rider.anatomy import JOINT_NAMES
-from mjchair.simulation.table import Table, read_table
+from mjchair.simulation.inputs import OTHER_COLUMNS
+from mjchair.simulation.table import Table, check_units, read_table
 
 Array = NDArray[np.float64]
 
@@ -311,6 +313,12 @@ def _short(path: Path) -> str:
     return f"{path.parent.name}/{path.name}" if generic else path.name
 
 
+def _units(columns: Iterable[str]) -> dict[str, str]:
+    """SI units of a table's columns of wheels, IMU and chair, by their names."""
+    sensed = {c: sensor(c).unit for c in columns if rolls(c) or c.startswith("imu_")}
+    return {**sensed, "left_wheel": "N m", "right_wheel": "N m", **OTHER_COLUMNS}
+
+
 def _table(source: Source) -> Instrument:
     """A table whose columns are a study's, by name or by a mapping."""
     export = None
@@ -319,6 +327,7 @@ def _table(source: Source) -> Instrument:
         time, columns, trigger = export.time, dict(export.columns), export.trigger
     else:
         table = read_table(source.path)
+        check_units(table, _units(table.columns))
         if RIDER_COLUMNS & set(table.columns) and not _of_wheel(table):
             return _rider(source, table)
         time, columns, trigger = np.asarray(table.time), dict(table.columns), None
