@@ -214,6 +214,14 @@ def test_a_coast_with_one_wheel_is_said_and_one_with_a_gyroscope_needs_no_word(t
     assert mjchair.read_study(write(tmp_path, gyro, EAST)).notes == ()
 
 
+def test_what_is_known_of_the_first_sample_may_have_units(tmp_path):
+    told = '[trial.initial]\nheading = "180 deg"\nspeed = "3.6 km/h"\nyaw_rate = 0.1\n'
+    (run,) = mjchair.read_study(write(tmp_path, wheels(), told)).runs
+    assert run.initial.heading == pytest.approx(np.pi)
+    assert (run.initial.speed, run.initial.yaw_rate) == (1.0, 0.1)
+    assert run.given == {"heading", "speed", "yaw_rate"}
+
+
 def test_one_torque_column_stays_one_where_a_turn_was_measured(tmp_path):
     columns = wheels() | {"left_wheel": np.full(TIME.size, 3.0)}
     study = mjchair.read_study(write(tmp_path, columns, EAST))

@@ -27,6 +27,7 @@ from mjchair.model.spec import load_spec
 from mjchair.rider.rider import RIDERS
 from mjchair.simulation.initial import Initial
 from mjchair.toml_file import read_toml
+from mjchair.units import quantity
 
 FILE = "study.toml"
 BETWEEN = ("straight", "hold")  # of two samples of an input
@@ -35,17 +36,30 @@ HEAVIEST = 250.0  # kg, of a load
 Positive = Annotated[float, Meta(gt=0)]
 
 
+INITIAL_UNITS = {"heading": "rad", "speed": "m/s", "yaw_rate": "rad/s"}
+
+
 class InitialEntry(Struct, forbid_unknown_fields=True):
     """[trial.initial]: what is known of the first sample, as in `Initial`."""
 
     position: tuple[float, float] | None = None
-    heading: float | None = None
-    speed: float | None = None
-    yaw_rate: float | None = None
+    heading: float | str | None = None
+    speed: float | str | None = None
+    yaw_rate: float | str | None = None
 
-    def given(self) -> dict[str, Any]:
-        """The fields that were given."""
-        return {f: v for f in self.__struct_fields__ if (v := getattr(self, f)) is not None}
+    def given(self, trial: str) -> dict[str, Any]:
+        """The fields that were given, in SI.
+
+        Raises:
+          MjchairError: a text that is no number with a unit, such as "180 deg".
+        """
+        told = {f: v for f in self.__struct_fields__ if (v := getattr(self, f)) is not None}
+        return {
+            f: quantity(v, INITIAL_UNITS[f], f"{trial}: the initial {f.replace('_', ' ')}")
+            if isinstance(v, str)
+            else v
+            for f, v in told.items()
+        }
 
 
 class LoadEntry(Struct, forbid_unknown_fields=True):
@@ -224,7 +238,7 @@ def _runs(entry: StudyEntry, path: Path, model: mujoco.MjModel) -> list[Run]:
             raise MjchairError(
                 f"{path}: trial {trial.name} holds the samples of {twin} again; keep one"
             )
-        given = told.initial.given() if told.initial is not None else {}
+        given = told.initial.given(trial.name) if told.initial is not None else {}
         unit_checks.check_initial(given, trial.name)
         load = None if told.load is None else Load(**structs.asdict(told.load))
         initial = Initial(**given)
