@@ -11,6 +11,7 @@ from figure_layout import assert_legible
 
 from mjchair.diagnosis.explain.column_ids import Driver, Quantity
 from mjchair.diagnosis.explain.missing_force import Products, mean_forces
+from mjchair.diagnosis.fit.variant import Variant
 from mjchair.diagnosis.replay.pulses import Force, Pulse
 from mjchair.diagnosis.result import (
     Candidate,
@@ -224,6 +225,35 @@ def test_a_sensor_at_fault_is_no_lack_of_the_chair(name, parameter, value, unit,
     assert "model.xml" in words.next_step(both)
 
 
+def test_what_is_named_beside_more_that_is_missing_is_no_last_word():
+    found = Diagnosis(
+        verdict=Verdict.NAMED,
+        effects=[ROLLING],
+        gap=GapSummary(before=3.0, after=0.9, scope="", p_value=0.0, p_value_after=0.5),
+        more_missing=True,
+    )
+    assert "look for what is left" in words.next_step(found)
+    assert "of the gap, and a remainder is left. The chair lacks" in words.missing(found)
+    found.correction = Variant((), {"mass": -3.0, "centre_x": 2.0})
+    said = "of the gap, with the mass of chair and person together as far from what the study says "
+    assert said + "as is believed. The chair" in words.missing(found)
+    found.gap = dataclasses.replace(found.gap, after=1.3)
+    assert "as is believed, and a remainder is left. The chair" in words.missing(found)
+
+
+def test_how_probable_a_lone_effect_is_stands_in_the_first_sentence():
+    found = Diagnosis(
+        verdict=Verdict.AMBIGUOUS,
+        effects=[ROLLING],
+        probability={"rolling_resistance": 0.8, "rolling_resistance+toe": 0.07, "none": 0.13},
+    )
+    said = words.missing(found)
+    assert said.startswith("Probably (87%), the chair lacks **rolling resistance** (")
+    assert said.endswith("; these runs are not enough to name it.")
+    found.probability = {"rolling_resistance": 0.4, "outside": 0.6}
+    assert "the evidence is thin" in words.missing(found)
+
+
 def test_rivals_are_in_the_first_sentence():
     sets = [["floor_slope", "rolling_resistance"]]
     said = words.missing(Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets))
@@ -256,7 +286,7 @@ def test_what_is_in_every_explanation_is_said_before_what_is_open():
         "the correction has **rolling resistance** (coefficient 0.01460 ± 0.00040)."
     )
     thin = dataclasses.replace(found, effects=[BIAS], alternatives=[])
-    assert "the correction has **sensor bias** on imu_gyro.z (bias 0.1" in words.missing(thin)
+    assert words.missing(thin).startswith("Probably (96%), the sensor of imu_gyro.z shows 0.1")
     doubted = dataclasses.replace(found, probability={"outside": 0.5, f"toe+{BIAS.key}": 0.5})
     assert words.certain(doubted) == []
 

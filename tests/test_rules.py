@@ -139,6 +139,20 @@ def test_what_held_out_trials_show_again_did_not_happen_once(before, after, chan
     assert rules.explains(one_run) == again
 
 
+@pytest.mark.parametrize(
+    ("after", "changed", "answer"),
+    [
+        (989.0, 214.0, True),  # of a gap of 900 that another cause makes, what brings anything
+        (830.0, 1400.0, False),  # what changes more than there is brings a fifth of it,
+        (810.0, 1400.0, True),
+        (990.0, 1400.0, False),  # and a floor in waves is no slope
+    ],
+)
+def test_what_changes_held_out_trials_a_lot_brings_something_there(after, changed, answer):
+    held = HeldOut(before=1000.0, after=after, dof=100.0, changed=changed)
+    assert rules.explains(replace(CLEAR, held_out=held)) == answer
+
+
 @pytest.mark.parametrize(("chi2", "wrong"), [(190.0, True), (180.0, False)])
 def test_a_chair_that_foretells_wrongly_is_no_answer(chi2, wrong):
     """Twice three standard deviations of 100 degrees of freedom are 85."""
@@ -241,6 +255,18 @@ def test_what_an_answer_leaves_is_said():
         # an answer that is rather not there is none, unless something shows
         ({"force": 4.0, "excess": 1.9, "said": Verdict.AMBIGUOUS, "probability": 0.49}, False),
         ({"force": 4.0, "excess": 2.1, "said": Verdict.AMBIGUOUS, "probability": 0.49}, True),
+        # unless it takes back what stands on a wall and hides the gap
+        (
+            {
+                "force": 4.0,
+                "excess": 1.9,
+                "said": Verdict.AMBIGUOUS,
+                "probability": 0.49,
+                "freed": True,
+            },
+            True,
+        ),
+        ({"force": 4.0, "excess": 1.9, "freed": True}, False),
         # where nothing is the most probable, the residual must show as clearly as a gap does
         ({"force": 4.0, "excess": 4.9, "nothing": True}, False),
         ({"force": 4.0, "excess": 5.1, "nothing": True}, True),
@@ -265,8 +291,12 @@ def test_the_words_of_none_that_matters_fit_the_force():
     """A force above the limit is not said to be below it."""
     gap = SimpleNamespace(p_value=1e-6)
     small, large = (SimpleNamespace(value=v, limit=1.2) for v in (0.4, 3.7))
-    assert "below 1.2 N" in nothing_missing(SimpleNamespace(gap=gap, material=small))
-    assert "N" not in nothing_missing(SimpleNamespace(gap=gap, material=large)).removeprefix("N")
+    below, above = (
+        nothing_missing(SimpleNamespace(gap=gap, material=m, next_experiment=""))
+        for m in (small, large)
+    )
+    assert "below 1.2 N" in below
+    assert "N" not in above.removeprefix("N")
 
 
 @pytest.mark.parametrize(
@@ -289,6 +319,8 @@ def test_nothing_is_missing_only_if_the_chair_is_where_the_fit_moved_it():
     )
     assert nothing_missing(plain).startswith("Nothing: ")
     assert nothing_missing(far).startswith("Nothing, if the chair is as far ")
+    far.gap, far.material = SimpleNamespace(p_value=1e-6), SimpleNamespace(value=0.4, limit=1.2)
+    assert nothing_missing(far).startswith("Nothing that matters, if the chair is as far ")
 
 
 def test_an_event_stands_beside_an_effect_that_brings_little_more():

@@ -85,6 +85,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         sigmas=min(stands.sigmas, default=0.0) if stands else 0.0,
         probability=of_any(probability, _standing_keys(choice)) if choice else 0.0,
         nothing=max(probability, key=probability.__getitem__) == NONE,
+        freed=bool(choice and _walls(base.plain) and not _walls(choice.fitted)),
     ):
         said = Verdict.NONE
     if said == Verdict.UNKNOWN and choice is None:
@@ -106,11 +107,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         drivers=left,
         nearest=_nearest(base, choice, closed) if choice and said == Verdict.UNKNOWN else None,
         probability=probability,
-        more_missing=bool(
-            named
-            and stands
-            and rules.more_missing(stands, len(bounded.at_walls(named.fitted.variant.offsets)))
-        ),
+        more_missing=bool(named and stands and rules.more_missing(stands, _walls(named.fitted))),
         material=size,
         process=_process(base),
         terms=named.fitted.variant.terms if named else (),
@@ -118,6 +115,11 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         evidence=evidence(base, named.fitted if named else None, plan, forces),
         stages=Stages(base=base, gap=gap, choice=choice),
     )
+
+
+def _walls(fitted: Fitted) -> int:
+    """How many numbers that are only roughly known stand on their walls."""
+    return len(bounded.at_walls(fitted.variant.offsets))
 
 
 def _nearest(base: Base, choice: Choice, closed: float) -> Nearest:

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 CLOSES = 0.8  # share of the excess that a named effect closes
 PARTLY = 0.5  # share that an effect closes which is part of an answer, with a remainder
 CARRIED = 0.5  # share of the excess on held-out trials that it closes there
+# the same of an answer beside which more is missing, where its effects change as much as there is
+BROUGHT = 0.2
 PROBABLE = 0.95  # probability of a named effect
 FAR = 2.5  # standard deviations: what is only roughly known and was moved as far is measured
 SHOWN = 0.1  # probability of what is shown as a rival whatever its chi2
@@ -199,11 +201,13 @@ def carries_over(held: HeldOut) -> bool:
 def opens_a_gap(held: HeldOut) -> bool:
     """Whether the effects are no better than nothing on held-out trials.
 
-    Where a gap shows that they change, they must bring something; where none does, none may open
-    beyond the scatter of noise. What brings less than `carries_over` asks is an answer beside which
-    more is missing.
+    Where a gap shows that they change, they must bring something, and BROUGHT of it where they
+    change more than there is; where none does, none may open beyond the scatter of noise. What
+    brings less than `carries_over` asks is an answer beside which more is missing.
     """
-    return held.left >= (held.gap if held.shown else held.gap + held.scatter)
+    if not held.shown:
+        return held.left >= held.gap + held.scatter
+    return held.left >= held.gap * (1.0 - BROUGHT if held.changed >= held.gap else 1.0)
 
 
 def shows_again(held: HeldOut) -> bool:
@@ -261,7 +265,7 @@ def more_missing(choice: Standing, walls: int) -> bool:
 
 def matters(
     *, force: float, limit: float, gap: float, excess: float, told: bool, said: Verdict,
-    sigmas: float, probability: float, nothing: bool = False,
+    sigmas: float, probability: float, nothing: bool = False, freed: bool = False,
 ) -> bool:  # fmt: skip
     """Whether a gap is one that matters.
 
@@ -274,10 +278,12 @@ def matters(
       probability: that an effect of the answer is there.
       nothing: whether that nothing is missing is more probable than any one explanation; then the
         whole residual must show as clearly as a gap does.
+      freed: whether numbers that are only roughly known stand on their walls without the answer,
+        and none does with it: then they hide the gap, and the answer is what pushed them there.
       sigmas: of the least certain effect. Without a limit that was told, what is CERTAIN
         matters whatever its size, and a gap of twice the noise is one though no force goes with it.
     """
-    answered = said != Verdict.UNKNOWN and probability >= LIKELY
+    answered = said != Verdict.UNKNOWN and (probability >= LIKELY or freed)
     shows = LEAST if nothing else SHOWS
     if not answered and not told and excess < shows and gap < SMALL_GAP:
         return False

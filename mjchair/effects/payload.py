@@ -30,7 +30,7 @@ EFFECT = Effect(
     name="payload",
     parameters=(
         Parameter("mass", "kg", 8.0, -30.0, 80.0),
-        Parameter("height", "m", 0.6, 0.0, 1.6, 0.6),
+        Parameter("height", "m", 0.6, 0.0, 1.6, 0.6, scale=0.6, sized=False),
     ),
     signature="inertia and load together",
     source="a bag or a lap tray is 2-15 kg",

@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 from mjchair.diagnosis.explain.calibration import NONE
 from mjchair.diagnosis.explain.column_ids import Quantity
+from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.process import Part
-from mjchair.diagnosis.next_experiment.wording import plain
+from mjchair.diagnosis.next_experiment.wording import MEASURED, plain
 from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.result import (
     Diagnosis,
@@ -22,7 +23,7 @@ from mjchair.diagnosis.result import (
     MissingForce,
     NamedEffect,
 )
-from mjchair.diagnosis.rules import LEVEL, PARTLY, PROBABLE, Verdict
+from mjchair.diagnosis.rules import LEVEL, LIKELY, PARTLY, PROBABLE, Verdict
 
 LEAST = 1e-6  # a chance below this is said to be below it
 # what a force may go with that is not known where nothing tells how the chair turns
@@ -48,6 +49,10 @@ def missing(diagnosis: Diagnosis) -> str:
 def _undecided(diagnosis: Diagnosis) -> str:
     """What is missing whichever it is, and what these runs cannot tell apart."""
     sets = _sets(diagnosis.alternatives)
+    likely = of_named(diagnosis)
+    if not sets and likely >= LIKELY:
+        what = found_words(diagnosis.effects)
+        return f"Probably ({likely:.0%}), {what}; these runs are not enough to name it."
     doubt = (
         f"{sets}, which these runs cannot tell apart"
         if sets
@@ -110,21 +115,27 @@ def certain(diagnosis: Diagnosis) -> list[NamedEffect]:
     return [e for e in diagnosis.effects if e.key not in open_ones and holding[e.key] >= PROBABLE]
 
 
+def of_named(diagnosis: Diagnosis) -> float:
+    """Probability that the effects of the diagnosis are there, with others or not."""
+    keys = {e.key for e in diagnosis.effects}
+    return sum(p for name, p in diagnosis.probability.items() if keys <= set(name.split("+")))
+
+
 def nothing_missing(diagnosis: Diagnosis) -> str:
     """That nothing is missing, or nothing that matters, with the number."""
     gap, material = diagnosis.gap, diagnosis.material
+    far = ", if the chair is as far from what the study says as these runs put it"
+    far = far if diagnosis.next_experiment else ""
     if gap is None or gap.p_value >= LEVEL or material is None:
-        far = ", if the chair is as far from what the study says as these runs put it"
-        said = "the chair explains these runs as well as the noise in them allows."
-        return f"Nothing{far if diagnosis.next_experiment else ''}: {said}"
+        return f"Nothing{far}: the chair explains these runs as well as the noise in them allows."
     if material.value >= material.limit:
         return (
-            "Nothing that matters: single tests stand out that no effect explains, but all that is "
-            "left together is no more than noise."
+            f"Nothing that matters{far}: single tests stand out that no effect explains, but all "
+            "that is left together is no more than noise."
         )
     return (
-        "Nothing that matters: more than noise is left, but no missing force is larger than "
-        f"{material.value:.2g} N, and below {material.limit:.2g} N none matters."
+        f"Nothing that matters{far}: more than noise is left, but no missing force is larger than "
+        f"{material.value:.2g} N, and below {material.limit:.2g} N none matters, whatever makes it."
     )
 
 
@@ -145,10 +156,23 @@ def remainder_words(diagnosis: Diagnosis) -> str:
         return ""
     closed = max((e.closure for e in diagnosis.effects), default=0.0)
     goes = ", which goes with " + str(diagnosis.drivers[0].goes_with) if diagnosis.drivers else ""
+    ends = _at_their_ends(diagnosis)
+    left = [f"with {ends} as far from what the study says as is believed"] if ends else []
+    after = diagnosis.gap.after if diagnosis.gap else None
+    if not ends or after is None or after > 1.0:
+        left.append(f"and a remainder is left{goes}")
     return (
-        f"More is missing than what is named here: that explains {closed:.0%} of the gap, and a "
-        f"remainder is left{goes}. "
+        f"More is missing than what is named here: that explains {closed:.0%} of the gap, "
+        f"{', '.join(left)}. "
     )
+
+
+def _at_their_ends(diagnosis: Diagnosis) -> str:
+    """What is only roughly known and was moved as far as is believed; empty: nothing was."""
+    if diagnosis.correction is None:
+        return ""
+    names = bounded.at_walls(diagnosis.correction.offsets)
+    return " and ".join(MEASURED.get(name, plain(name)) for name in names)
 
 
 def process_words(diagnosis: Diagnosis) -> str:
@@ -270,6 +294,11 @@ def next_step(diagnosis: Diagnosis) -> str:
         if diagnosis.effects and all(e.channel is not None for e in diagnosis.effects):
             chair = "" if diagnosis.more_missing else "; the chair lacks nothing"
             return f"These data decide: correct what the sensor shows{chair}."
+        if diagnosis.more_missing:
+            return (
+                "These data decide what is named. Use the corrected chair (model.xml), but look "
+                "for what is left; what goes with it is listed below."
+            )
         return "These data decide; use the corrected chair (model.xml)."
     return first_sentence(diagnosis.next_experiment)
 

@@ -227,7 +227,9 @@ def _refusal(model: mujoco.MjModel, placed: mujoco.MjData, held: bool, outcome: 
         middle = 0.5 * (low + high)
         ended = _settled(model, copy.copy(placed), held, middle, LIMIT_TIME)
         low, high = (middle, high) if ended is Outcome.STANDS else (low, middle)
-    limit = f"stands so up to {_slope(low * angle)}" if low else "does not stand on the level either"
+    limit = (
+        f"stands so up to {_slope(low * angle)}" if low else "does not stand on the level either"
+    )
     return (
         f"the chair {outcome.value} {how} on a slope of {_slope(angle)}; {rule}, "
         f"and this one {limit}"
