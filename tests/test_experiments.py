@@ -241,6 +241,16 @@ def test_a_chair_that_is_shaken_promises_less(one_way, against_slope):
 def test_a_lab_without_torque_gets_none():
     assert all(m.torque is None for m in possible(Setting((0.0, 0.0), 0.0, 0.0)))
     assert len(possible(Setting((0.0, 0.0), 0.0, 10.0))) == len(LIBRARY)
+
+
+def test_with_one_wheel_measured_nothing_that_turns_is_asked_for():
+    """The other wheel is taken to roll alike, which a spin on the spot does not."""
+    asked = {m.name for m in possible(Setting((0.0, 0.0), 0.0, 10.0, straight=True))}
+    assert asked == {
+        "stand", "coast", "coast reversed", "coast across", "fast coast", "slow coast",
+        "coast backwards", "coast a metre aside", "pushes", "short steps", "long steps",
+        "loaded coast",
+    }  # fmt: skip
     assert len({m.name for m in LIBRARY}) == len(LIBRARY)
 
 

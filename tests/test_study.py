@@ -550,6 +550,31 @@ def test_what_a_person_measured_makes_effects_rarer_that_say_it_is_wrong(tmp_pat
     )
 
 
+@pytest.mark.parametrize(
+    ("starts", "unplaced"),
+    [
+        (["", ""], ("a", "b")),
+        (["position = [0.0, 1.0]\n", ""], ("b",)),
+        (["position = [0.0, 1.0]\n", "position = [2.0, 0.0]\n"], ()),
+        ([""], ()),  # a lone run has a frame of its own
+    ],
+)
+def test_a_place_on_the_floor_is_looked_for_where_runs_share_a_frame(starts, unplaced, tmp_path):
+    """Each run was taken to start at the origin, and two coasts over one joint were a patch."""
+    from mjchair.diagnosis.diagnose import study_effects
+
+    lines = []
+    for k, (name, start) in enumerate(zip("ab", starts, strict=False)):
+        write(tmp_path, wheels(1.0 - 0.1 * k))
+        (tmp_path / "a.csv").rename(tmp_path / f"run_{name}.csv")
+        lines.append(f'[[trial]]\nfile = "run_{name}.csv"\n[trial.initial]\nheading = 0.0\n{start}')
+    (tmp_path / "study.toml").write_text("\n".join(lines))
+    study = mjchair.read_study(tmp_path)
+    assert study.unplaced == tuple(f"run_{name}" for name in unplaced)
+    looked_for = "surface_patch" in {e.name for e in study_effects(study)}
+    assert looked_for == (not unplaced)
+
+
 def test_what_a_person_knows_reaches_the_rules_of_the_diagnosis(tmp_path):
     from mjchair.diagnosis.diagnose import study_effects
     from mjchair.diagnosis.fit import noise_levels

@@ -383,7 +383,13 @@ def _remark(fitted: Fitted, term: Term) -> str:
 def _notes(
     base: Base, choice: Choice | None, closed: float, said: Verdict, left: list[MissingForce]
 ) -> list[str]:
-    notes = list(base.bench.simulator.study.notes)
+    study = base.bench.simulator.study
+    notes = list(study.notes)
+    if study.unplaced:
+        notes.append(
+            f"where {', '.join(study.unplaced)} starts is neither measured nor given; no place on "
+            "the floor is looked for, such as a surface_patch ([trial.initial] gives a position)"
+        )
     for channel, noise in base.bench.noise.items():
         if noise.source != "study.toml":
             notes.append(f"noise of {channel}: {noise.total:.3g} (SI), from {noise.source}")

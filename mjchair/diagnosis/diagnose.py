@@ -37,6 +37,7 @@ def study_effects(study: Study, more: Sequence[Effect] = ()) -> list[Effect]:
         effect
         for effect in known
         if not (effect.outdoors and study.indoors)
+        and not (effect.place and study.unplaced)
         and not (effect.commanded and study.torque_measured)
     ]
     wrong = mistaken(study.channels, study.nuisance, study.driven_as_measured)

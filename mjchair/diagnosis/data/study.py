@@ -91,6 +91,18 @@ class Study:
         return self.torque_measured and any(set(WHEELS[:2]) & set(names) for names in driven)
 
     @property
+    def unplaced(self) -> tuple[str, ...]:
+        """Runs of which nothing tells where they start beside the others; a lone run needs none."""
+        seen = {"position.x", "position.y"}
+        if len(self.runs) == 1:
+            return ()
+        return tuple(
+            run.trial.name
+            for run in self.runs
+            if "position" not in run.given and not seen <= set(run.trial.channels)
+        )
+
+    @property
     def fitted(self) -> tuple[int, ...]:
         """Indices of the runs that are not held out."""
         return tuple(i for i, run in enumerate(self.runs) if not run.hold_out)

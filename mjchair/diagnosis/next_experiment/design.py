@@ -259,6 +259,7 @@ def _evidence(
         np.column_stack([np.convolve(v, mean, mode="valid") for v in values.T])
         for values in (apart, ours)
     )
+    apart[:, [c in bench.simulator.study.copied for c in channels]] = 0.0  # nobody can look at it
     row, k = np.unravel_index(np.argmax(np.abs(apart) / noise), apart.shape)
     when = float(time[row : row + width].mean())
     value, by = float(ours[row, k]), float(apart[row, k])

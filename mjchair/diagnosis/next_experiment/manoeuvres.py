@@ -47,6 +47,14 @@ class Manoeuvre:
     load: Load | None = None
     seconds: float = SECONDS
 
+    @property
+    def turns(self) -> bool:
+        """Whether its two rear wheels do not roll alike."""
+        if self.torque is None or self.yaw_rate:
+            return bool(self.yaw_rate)
+        left, right = self.torque(np.arange(0.0, self.seconds, GRID))
+        return not np.array_equal(left, right)
+
 
 @dataclass(frozen=True)
 class Setting:
@@ -55,12 +63,14 @@ class Setting:
     Attributes:
       position: (x, y) m and heading (rad) of a start. torque: largest, N m; 0 where none is told.
       run: name of the run that starts there.
+      straight: whether only one wheel is measured, and taken for both.
     """
 
     position: tuple[float, float]
     heading: float
     torque: float
     run: str = ""
+    straight: bool = False
 
     def initial(self, manoeuvre: Manoeuvre) -> Initial:
         """How the manoeuvre starts here."""
@@ -94,7 +104,8 @@ def setting(study: Study) -> Setting:
     driven = [r.trial.inputs for r in runs if r.trial.inputs is not None]
     torque = float(np.median([_peak(inputs) for inputs in driven] or [0.0]))
     place = first.position or (0.0, 0.0)
-    return Setting(place, first.heading or 0.0, torque, coast.trial.name)
+    heading, straight = first.heading or 0.0, bool(study.copied)
+    return Setting(place, heading, torque, coast.trial.name, straight)
 
 
 def _peak(inputs: Inputs) -> float:
@@ -102,8 +113,15 @@ def _peak(inputs: Inputs) -> float:
 
 
 def possible(here: Setting) -> list[Manoeuvre]:
-    """The manoeuvres that a lab can make: those with torque only where it measures torque."""
-    return [m for m in LIBRARY if m.torque is None or here.torque > 0.0]
+    """The manoeuvres that a lab can make and see.
+
+    Those with torque only where it measures torque, and with one wheel for both only straight ones.
+    """
+    return [
+        m
+        for m in LIBRARY
+        if (m.torque is None or here.torque > 0.0) and not (m.turns and here.straight)
+    ]
 
 
 def _strokes(time: Array) -> tuple[Array, Array]:
