@@ -115,3 +115,25 @@ def test_a_step_that_promised_much_and_failed_is_made_anew_with_small_changes(mo
     assert going[0].touchy and not going[1].touchy
     assert window_states._goes_on(going[0], window_states.ROUNDS, kept=True, stands=False)
     assert not window_states._goes_on(going[1], window_states.ROUNDS, kept=True, stands=False)
+
+
+@pytest.mark.parametrize("placed", [True, False])
+def test_what_a_window_cannot_tell_is_not_simulated(placed, monkeypatch):
+    """The prior of a position that no channel sees holds it."""
+    seen = np.r_[placed, placed, True, True, True, False, False]
+    monkeypatch.setattr(window_states.first_state, "observed", lambda _: seen)
+
+    def run(jobs):  # each channel shows the sum of the state
+        return [SimpleNamespace(predicted=np.full((4, 2), job.state.sum())) for job in jobs]
+
+    simulator = SimpleNamespace(
+        chair=SimpleNamespace(moved=lambda state, step: state + step),
+        windows=[SimpleNamespace(run=0)],
+        study=SimpleNamespace(runs=[None]),
+        run=run,
+    )
+    errors = SimpleNamespace(applied=lambda _simulator, _window, predicted: predicted)
+    states = {0: np.ones(len(SLOW))}
+    (answers,) = window_states._answers(simulator, None, errors, states, 0.5).values()
+    expected = np.where(np.arange(len(SLOW)) < 2, STEPS * placed, STEPS)  # a caster is told later
+    np.testing.assert_allclose(answers, np.broadcast_to(expected, (4, 2, len(SLOW))))
