@@ -112,6 +112,13 @@ def test_what_cannot_be_known_is_asked_for_by_name(folder):
     assert "wheel_radius = 0.300" in text
 
 
+def test_a_wheel_in_a_unit_of_something_else_is_refused(tmp_path):
+    rows = "".join(f"{0.02 * k!r},{3.6 - 0.02 * k!r}\n" for k in range(100))
+    (tmp_path / "coast.csv").write_text("time,left_wheel_speed [km/h]\n" + rows)
+    with pytest.raises(MjchairError, match="left_wheel_speed is in km/h; it must be in rad/s"):
+        gather(tmp_path)
+
+
 def test_swapped_sides_are_seen_by_the_gyroscope(folder, tmp_path):
     (tmp_path / "push1_imu").mkdir()
     (tmp_path / "push1_imu" / "sensors.csv").write_bytes(
