@@ -90,11 +90,9 @@ def test_of_sizes_that_fit_alike_the_least_stands_in_the_chair(monkeypatch, size
 
 def test_an_effect_of_an_open_size_is_as_sure_as_what_it_brings():
     """No standard error tells that a caster is stuck: by it, the caster seemed to be free."""
-    stuck, camber = (SimpleNamespace(effect=find(n)) for n in ("caster_friction", "camber"))
     fitted = SimpleNamespace(sigmas={"caster_friction": 1.3, "camber": 10.0}, at_least={})
-    choice = SimpleNamespace(
-        fitted=fitted, hypothesis=SimpleNamespace(starts=(camber, stuck)), own_gains=[98.0, 3600.0]
-    )
+    brought = {"camber": 98.0, "caster_friction": 3600.0}
+    choice = SimpleNamespace(fitted=fitted, brought=brought)
     assert decide._sigmas(choice) == (1.3, 10.0)
     fitted.at_least[MOMENT] = 0.25
     assert decide._sigmas(choice) == (60.0, 10.0)

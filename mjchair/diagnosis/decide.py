@@ -156,8 +156,7 @@ def _sigmas(choice: Choice) -> tuple[float, ...]:
 
     Where far larger sizes fit as well, no standard error tells; what the effect brings does.
     """
-    fitted, starts = choice.fitted, choice.hypothesis.starts
-    own = {s.effect.key: g for s, g in zip(starts, choice.own_gains, strict=True)}
+    fitted, own = choice.fitted, choice.brought
     endless = {parameter.effect for parameter in fitted.at_least}
     return tuple(
         math.sqrt(max(own[key], 0.0)) if key in endless else sigmas
@@ -199,12 +198,15 @@ def _plan(base: Base, choice: Choice, once: bool) -> tuple[Plan | None, list[str
       once: whether something that happened once fits about as well.
     """
     chosen = choice.fitted
-    near, needed = [], []
-    for without, _, rival in exchanged(choice):
-        behind = rival.fitted.total - chosen.total
-        brought = sum(choice.brought[s.effect.key] for s in without)
-        near.append(rival.fitted)
-        needed.append(rules.to_rule_out(behind=behind, gain=brought))
+    rivals = [rival for *_, rival in exchanged(choice)]
+    near = [rival.fitted for rival in rivals]
+    needed = [
+        rules.to_rule_out(
+            behind=rival.fitted.total - chosen.total,
+            gain=choice.brought_beyond(rival.hypothesis),
+        )
+        for rival in rivals
+    ]
     if once:
         near.append(base.plain)
         needed.append(rules.to_show_again(event=event.largest(base), gain=choice.hypothesis.gain))

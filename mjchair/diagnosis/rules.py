@@ -20,8 +20,7 @@ Array = NDArray[np.float64]
 CLOSES = 0.8  # share of the excess that a named effect closes
 PARTLY = 0.5  # share that an effect closes which is part of an answer, with a remainder
 CARRIED = 0.5  # share of the excess on held-out trials that it closes there
-# the same of an answer beside which more is missing, where its effects change as much as there is
-BROUGHT = 0.2
+BROUGHT = 0.2  # and that any answer closes there whose effects change more than the excess
 PROBABLE = 0.95  # probability of a named effect
 FAR = 2.5  # standard deviations: what is only roughly known and was moved as far is measured
 SHOWN = 0.1  # probability of what is shown as a rival whatever its chi2

@@ -18,7 +18,7 @@ import numpy as np
 from mjchair.errors import MjchairError, nearest
 from mjchair.model.wheels import base_name
 from mjchair.rider.anatomy import JOINT_NAMES
-from mjchair.simulation.channels import channel_units, channels
+from mjchair.simulation.channels import channel_units
 from mjchair.simulation.frozen import FrozenRecord
 from mjchair.simulation.inputs import OTHER_COLUMNS, Inputs, control_units, drivable
 from mjchair.simulation.table import Array, Table, check_units, leave_out, merged, read_table
@@ -83,8 +83,8 @@ def read_trial(
 
 def trial_from_table(table: Table, model: mujoco.MjModel, name: str, hold: bool = False) -> Trial:
     """A trial of a table; see `read_trial`."""
-    sensed, driven = _sensed(model), _driven(model)
-    check_units(table, {**channel_units(model), **control_units(model), **OTHER_COLUMNS})
+    sensed, driven = channel_units(model), _driven(model)
+    check_units(table, {**sensed, **control_units(model), **OTHER_COLUMNS})
     moving = bool(driven & set(JOINT_NAMES))  # then its joints say where its mass is
     measured, controls, other = {}, {}, {}
     for column, values in table.columns.items():
@@ -129,19 +129,13 @@ def check_columns(trial: Trial, model: mujoco.MjModel) -> None:
     """
     controls = trial.inputs.controls if trial.inputs is not None else {}
     for columns, known in (
-        (trial.channels, _sensed(model)),
+        (trial.channels, set(channel_units(model))),
         (controls, _driven(model)),
         (trial.other, set(OTHER_COLUMNS)),
     ):
         for column in columns:
             if column not in known:
                 _refuse(column, known, f"trial {trial.name}")
-
-
-def _sensed(model: mujoco.MjModel) -> set[str]:
-    """Names of the channels of a model, with and without their prefix."""
-    full = {c.name for c in channels(model)}
-    return full | {base_name(name) for name in full}
 
 
 def _driven(model: mujoco.MjModel) -> set[str]:

@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 from mjchair.diagnosis.explain.calibration import NONE
 from mjchair.diagnosis.explain.column_ids import Quantity
+from mjchair.diagnosis.explain.probability import of_effects
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.process import Part
-from mjchair.diagnosis.next_experiment.wording import MEASURED, plain
+from mjchair.diagnosis.next_experiment.wording import measured, plain
 from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.result import (
     Diagnosis,
@@ -49,7 +50,7 @@ def missing(diagnosis: Diagnosis) -> str:
 def _undecided(diagnosis: Diagnosis) -> str:
     """What is missing whichever it is, and what these runs cannot tell apart."""
     sets = _sets(diagnosis.alternatives)
-    likely = of_named(diagnosis)
+    likely = of_effects(diagnosis.probability, [e.key for e in diagnosis.effects])
     if not sets and likely >= LIKELY:
         what = found_words(diagnosis.effects)
         return f"Probably ({likely:.0%}), {what}; these runs are not enough to name it."
@@ -108,17 +109,11 @@ def _capital(text: str) -> str:
 def certain(diagnosis: Diagnosis) -> list[NamedEffect]:
     """Effects that are in nearly every explanation, and for which no other can stand."""
     open_ones = {n for s in diagnosis.alternatives for names in s for n in names.split("+")}
-    holding = {
-        e.key: sum(p for name, p in diagnosis.probability.items() if e.key in name.split("+"))
+    return [
+        e
         for e in diagnosis.effects
-    }
-    return [e for e in diagnosis.effects if e.key not in open_ones and holding[e.key] >= PROBABLE]
-
-
-def of_named(diagnosis: Diagnosis) -> float:
-    """Probability that the effects of the diagnosis are there, with others or not."""
-    keys = {e.key for e in diagnosis.effects}
-    return sum(p for name, p in diagnosis.probability.items() if keys <= set(name.split("+")))
+        if e.key not in open_ones and of_effects(diagnosis.probability, [e.key]) >= PROBABLE
+    ]
 
 
 def nothing_missing(diagnosis: Diagnosis) -> str:
@@ -172,7 +167,7 @@ def _at_their_ends(diagnosis: Diagnosis) -> str:
     if diagnosis.correction is None:
         return ""
     names = bounded.at_walls(diagnosis.correction.offsets)
-    return " and ".join(MEASURED.get(name, plain(name)) for name in names)
+    return " and ".join(map(measured, names))
 
 
 def process_words(diagnosis: Diagnosis) -> str:
@@ -295,9 +290,10 @@ def next_step(diagnosis: Diagnosis) -> str:
             chair = "" if diagnosis.more_missing else "; the chair lacks nothing"
             return f"These data decide: correct what the sensor shows{chair}."
         if diagnosis.more_missing:
+            below = "; what goes with it is listed below" if known_drivers(diagnosis) else ""
             return (
                 "These data decide what is named. Use the corrected chair (model.xml), but look "
-                "for what is left; what goes with it is listed below."
+                f"for what is left{below}."
             )
         return "These data decide; use the corrected chair (model.xml)."
     return first_sentence(diagnosis.next_experiment)

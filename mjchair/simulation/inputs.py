@@ -196,10 +196,9 @@ def drivable(model: mujoco.MjModel) -> list[str]:
 
 def control_units(model: mujoco.MjModel) -> dict[str, str]:
     """SI unit of every actuator that turns a hinge and of joysticks, with and without prefix."""
-    units = {}
+    units, hinge = {}, int(mujoco.mjtJoint.mjJNT_HINGE)
     for i, name in enumerate(names.actuators(model)):
         on_joint = model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_JOINT
-        hinge = int(mujoco.mjtJoint.mjJNT_HINGE)
         if on_joint and model.jnt_type[model.actuator_trnid[i, 0]] == hinge:
             units[name] = "rad" if is_position(model, i) else "N m"
         if base_name(name) in JOYSTICK:

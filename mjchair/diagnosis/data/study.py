@@ -20,6 +20,8 @@ from mjchair.model.rolling import RearAxle, chair_body, rear_axle
 from mjchair.model.wheels import WHEELS
 from mjchair.simulation.initial import Initial
 
+PLACE = {"position.x", "position.y"}  # channels that tell where a run is
+
 
 @dataclass(frozen=True)
 class Run:
@@ -93,13 +95,12 @@ class Study:
     @property
     def unplaced(self) -> tuple[str, ...]:
         """Runs of which nothing tells where they start beside the others; a lone run needs none."""
-        seen = {"position.x", "position.y"}
         if len(self.runs) == 1:
             return ()
         return tuple(
             run.trial.name
             for run in self.runs
-            if "position" not in run.given and not seen <= set(run.trial.channels)
+            if "position" not in run.given and not set(run.trial.channels) >= PLACE
         )
 
     @property
@@ -159,7 +160,7 @@ def with_copied_wheels(study: Study) -> Study:
 
 def _without_heading(runs: list[Run]) -> list[str]:
     """A note on the runs of which nothing tells where in the world they head."""
-    tells = ({"heading"}, {"position.x", "position.y"})
+    tells = ({"heading"}, PLACE)
     blind = [
         run.trial.name
         for run in runs

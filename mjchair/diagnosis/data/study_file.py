@@ -33,10 +33,8 @@ FILE = "study.toml"
 BETWEEN = ("straight", "hold")  # of two samples of an input
 SIDES = ("left", "right")
 HEAVIEST = 250.0  # kg, of a load
-Positive = Annotated[float, Meta(gt=0)]
-
-
 INITIAL_UNITS = {"heading": "rad", "speed": "m/s", "yaw_rate": "rad/s"}
+Positive = Annotated[float, Meta(gt=0)]
 
 
 class InitialEntry(Struct, forbid_unknown_fields=True):

@@ -59,6 +59,10 @@ class Choice:
         keys = (s.effect.key for s in self.hypothesis.starts)
         return dict(zip(keys, self.own_gains, strict=True))
 
+    def brought_beyond(self, other: Hypothesis) -> float:
+        """Chi2 that the effects bring which another hypothesis does without."""
+        return sum(gain for key, gain in self.brought.items() if key not in other.keys)
+
 
 def is_there(fitted: Fitted) -> bool:
     """Whether effects are there by their own sizes, and not by numbers that only shape them.

@@ -20,12 +20,9 @@ FITTED = 3  # hypotheses, at most
 
 def better_than(fits: Fits, choice: Choice) -> Tried | None:
     """The best of the probable hypotheses that is better than the choice; None: none is."""
-    chosen, found = Tried(choice.hypothesis, choice.fitted), []
-    for hypothesis in _not_yet_fitted(fits, choice):
-        tried = fits.fit(hypothesis, chosen)
-        if tried is not None:
-            brought = sum(g for key, g in choice.brought.items() if key not in hypothesis.keys)
-            found.append((tried, brought))
+    chosen = Tried(choice.hypothesis, choice.fitted)
+    made = [fits.fit(hypothesis, chosen) for hypothesis in _not_yet_fitted(fits, choice)]
+    found = [(t, choice.brought_beyond(t.hypothesis)) for t in made if t is not None]
     return better_of(fits, chosen, found)
 
 

@@ -112,6 +112,11 @@ MEASURED = {
 }
 
 
+def measured(name: str) -> str:
+    """A number that is only roughly known, by its name, as words."""
+    return MEASURED.get(name, plain(name))
+
+
 def measuring(moved: Sequence[tuple[Nuisance, float]]) -> str:
     """What to measure where runs are explained by a chair that is far from what the study says.
 
@@ -123,7 +128,7 @@ def measuring(moved: Sequence[tuple[Nuisance, float]]) -> str:
     for n, by in moved:
         change = by * n.std
         size = f"{100.0 * change:+.0f} %" if n.unit == "1" else f"{change:+.2g} {n.unit}"
-        said.append(f"{MEASURED.get(n.name, plain(n.name))}: {size}, {abs(by):.1f} sigmas")
+        said.append(f"{measured(n.name)}: {size}, {abs(by):.1f} sigmas")
     if not said:
         return ""
     return (
