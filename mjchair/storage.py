@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from filelock import FileLock, Timeout
+
 from mjchair.errors import MjchairError
 
 
@@ -103,6 +105,33 @@ def output_folder(path: str | os.PathLike[str], force: bool = False) -> Path:
     except OSError as error:
         raise MjchairError(f"cannot make {folder}: {error.strerror}") from None
     return folder
+
+
+@contextmanager
+def only_writer(folder: Path) -> Iterator[None]:
+    """Within the block no other process that asks for this may write into the folder.
+
+    The operating system ends the lock with the process, however it ends.
+
+    Args:
+      folder: made where it is not there; the file `lock` in it is the lock.
+
+    Raises:
+      MjchairError: another process writes into it.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    lock = FileLock(folder / "lock", timeout=0)
+    try:
+        lock.acquire()
+    except Timeout:
+        raise MjchairError(
+            f"another mjchair writes into {folder.parent}; wait until it ends, or choose another "
+            "--out"
+        ) from None
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 def read_bounded(path: Path, largest: int, kind: str, reason: str) -> bytes:

@@ -18,6 +18,7 @@ from mjchair import cli
 from mjchair.commands.diagnose import CANDIDATE, GAP, TOP
 from mjchair.diagnosis.replay.cache import Store
 from mjchair.effects.library import find
+from mjchair.storage import only_writer
 
 CHANNELS = {"left_wheel_speed": 0.02, "right_wheel_speed": 0.02, "imu_gyro.z": 0.01}
 
@@ -211,6 +212,7 @@ INTERRUPTED = """
 import os, signal, sys
 from mjchair import cli
 from mjchair.diagnosis.replay.cache import Store
+from mjchair.storage import only_writer
 number, after = int(sys.argv[1]), int(sys.argv[2])
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job ignores Ctrl-C
 save, saved = Store.save, []
@@ -281,3 +283,14 @@ def test_a_simulation_that_was_cut_short_is_made_again(tmp_path):
         path.write_bytes(whole[:size])
         assert store.load("a") is None
         path.write_bytes(whole)
+
+
+def test_two_diagnoses_do_not_write_into_one_folder(done, tmp_path, capsys):
+    study, _ = done
+    out = tmp_path / "out"
+    with only_writer(out / "unfinished"):
+        assert cli.main(["diagnose", str(study), "--out", str(out)]) == 2
+        assert {p.name for p in (out / "unfinished").iterdir()} == {"lock"}
+    assert capsys.readouterr().err == (
+        f"mjchair: another mjchair writes into {out}; wait until it ends, or choose another --out\n"
+    )

@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     from mjchair.diagnosis.diagnose import diagnose
     from mjchair.diagnosis.replay.cache import Store
     from mjchair.effects import user_file
-    from mjchair.storage import check_vacant, output_folder
+    from mjchair.storage import check_vacant, only_writer, output_folder
 
     kept = Path(args.out) / CACHE
     force = args.force or _interrupted(kept)
@@ -82,21 +82,22 @@ def run(args: argparse.Namespace) -> int:
     for effect in effects:
         user_file.check(effect, study.spec)
     folder = output_folder(args.out, force)
-    try:
-        with _progress() as say:
-            found = diagnose(
-                study, effects=effects, say=say, store=Store(kept), threads=args.threads
-            )
-            say("report")
-            _write(folder, kept, study, found)
-    except MjchairError:
-        _clear(folder, kept)
-        raise
-    except KeyboardInterrupt:
-        said = f"interrupted; what was computed is in {kept}, and the same command goes on from it"
-        print(f"mjchair: {said}", file=sys.stderr)
-        return 130
-    shutil.rmtree(kept, ignore_errors=True)
+    with only_writer(kept):
+        try:
+            with _progress() as say:
+                found = diagnose(
+                    study, effects=effects, say=say, store=Store(kept), threads=args.threads
+                )
+                say("report")
+                _write(folder, kept, study, found)
+        except MjchairError:
+            _clear(folder, kept)
+            raise
+        except KeyboardInterrupt:
+            said = f"what was computed is in {kept}, and the same command goes on from it"
+            print(f"mjchair: interrupted; {said}", file=sys.stderr)
+            return 130
+        shutil.rmtree(kept, ignore_errors=True)
     print(f"{_line(found)}; see {folder}/report.html")
     return 0
 
