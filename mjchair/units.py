@@ -20,6 +20,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "in": ("m", 0.0254),
     "rad": ("rad", 1.0),
     "deg": ("rad", math.pi / 180.0),
+    "rev": ("rad", 2.0 * math.pi),
     "m/s": ("m/s", 1.0),
     "km/h": ("m/s", 1.0 / 3.6),
     "rad/s": ("rad/s", 1.0),

@@ -96,11 +96,11 @@ CASES = {
     ),
     "a wheel in degrees": (
         {"columns": coast() | {"left_wheel_speed": coast()["left_wheel_speed"] * 57.3}},
-        "left_wheel_speed looks like degrees",
+        "left_wheel_speed looks like deg/s or rpm",
     ),
     "both wheels in degrees": (
         {"columns": {n: v * 57.3 for n, v in coast().items()}},
-        "wheel_speed looks like degrees: it reaches",
+        "wheel_speed looks like deg/s or rpm: it reaches",
     ),
     "one slow wheel in degrees": (
         {"columns": coast(0.5) | {"left_wheel_speed": coast(0.5)["left_wheel_speed"] * 57.3}},
@@ -108,7 +108,7 @@ CASES = {
     ),
     "the only channel in degrees": (
         {"columns": {"left_wheel_speed": coast()["left_wheel_speed"] * 57.3}},
-        "left_wheel_speed looks like degrees",
+        "left_wheel_speed looks like deg/s or rpm",
     ),
     "slow wheels in degrees beside an accelerometer": (
         {
@@ -159,6 +159,50 @@ CASES = {
             }
         },
         "imu_accelerometer.x looks like g: the wheels gain 9.. times",
+    ),
+    "acceleration of the other sign": (
+        {"columns": {"left_wheel_speed": PUSH / 0.3, "imu_accelerometer.x": -PULL}},
+        "imu_accelerometer.x falls where left_wheel_speed rises: x is forward, so turn its sign",
+    ),
+    "another axis of the accelerometer": (
+        {"columns": coast() | {"imu_accelerometer.x": 9.81 + 0.1 * PULL}},
+        "imu_accelerometer.x stays near 9.8., as the axis does that points up",
+    ),
+    "a wheel in m/s beside an accelerometer": (
+        {"columns": {"left_wheel_speed": PUSH, "imu_accelerometer.x": PULL}},
+        "left_wheel_speed looks like m/s: .* divide it by the wheel's radius, 0.3 m",
+    ),
+    "wheels in m/s beside a gyroscope": (
+        {
+            "columns": {n: 0.3 * v for n, v in coast(turn=0.5).items()}
+            | {"imu_gyro.z": np.full(TIME.size, 0.5)}
+        },
+        "left_wheel_speed looks like m/s: the wheels tell 0.3. times what imu_gyro.z does",
+    ),
+    "places in mm": (
+        {"columns": {"position.x": 1200.0 * TIME, "position.y": 0.01 * TIME}},
+        r"position.x looks like mm or cm: it moves by 1.2e\+03 a second, .* position.x \[mm\]",
+    ),
+    "angles in turns beside places": (
+        {
+            "columns": {
+                "left_wheel_angle": 1.2 * TIME / 0.3 / (2.0 * np.pi),
+                "position.x": 1.2 * TIME,
+                "position.y": 0.0 * TIME + 0.1,
+            }
+        },
+        r"left_wheel_angle looks like turns: .* left_wheel_angle \[rev\]",
+    ),
+    "torques of left and right swapped": (
+        {
+            "columns": coast()
+            | {
+                "imu_gyro.z": 0.5 * np.sin(2.0 * TIME),
+                "left_wheel": 5.0 * np.sin(2.0 * TIME) + 8.0 * np.cos(2.0 * TIME),
+                "right_wheel": -5.0 * np.sin(2.0 * TIME) - 8.0 * np.cos(2.0 * TIME),
+            }
+        },
+        "the torques turn the chair right where imu_gyro.z turns left; are .* swapped",
     ),
     "torque in N mm": (
         {"columns": DRIVEN | {"left_wheel": 1000.0 * TORQUE}},

@@ -64,7 +64,7 @@ def test_a_fast_small_wheel_is_no_wheel_in_degrees():
     """6 m/s are 35 rad/s of these wheels, which a wheel of 0.3 m does not reach."""
     fast = wheels(6.2 - 0.2 * TIME)
     assert study(fast).channels
-    with pytest.raises(MjchairError, match="left_wheel_speed looks like degrees"):
+    with pytest.raises(MjchairError, match="left_wheel_speed looks like deg/s or rpm"):
         study(fast, "manual")
 
 

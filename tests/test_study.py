@@ -59,7 +59,7 @@ def test_missing_things_are_named(tmp_path):
 
 
 def test_degrees_are_recognised(tmp_path):
-    fails(write(tmp_path, wheels(57.3)), "left_wheel_speed looks like degrees")
+    fails(write(tmp_path, wheels(57.3)), "left_wheel_speed looks like deg/s or rpm")
 
 
 def on_a_bend(**changed):

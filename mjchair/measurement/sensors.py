@@ -18,6 +18,7 @@ class Sensor:
       floor: the least noise that is believed: no instrument, and no simulation at 2 ms, is better.
       fault: bias of a sensor that was not calibrated, as a rule (assumption).
       bias: standard deviation of the bias that every such sensor has; None: it has none.
+      drift: standard deviation of what the bias changes by from run to run; 0: it stays.
       gain: standard deviation of its scale about 1 (assumption); None: it counts or is calibrated.
       most: the largest value that a wheelchair shows. fastest: its largest rate, in unit/s.
         For a wheel both are of what the chair rolls: m and m/s.
@@ -29,6 +30,7 @@ class Sensor:
     floor: float
     fault: float
     bias: float | None = None
+    drift: float = 0.0
     gain: float | None = None
     most: float | None = None
     fastest: float | None = None
@@ -50,12 +52,25 @@ SENSORS = {
     ),
     "speed": Sensor(unit="rad/s", floor=3e-3, fault=0.1, degrees="deg/s"),
     "gyro": Sensor(
-        unit="rad/s", floor=1e-3, fault=0.02, bias=0.003, gain=0.01, most=12.0, degrees="deg/s"
-    ),  # bias: of a zeroed gyroscope
+        unit="rad/s",
+        floor=1e-3,
+        fault=0.02,
+        bias=0.003,  # of a zeroed gyroscope
+        drift=0.001,  # some degrees of warming (assumption)
+        gain=0.01,
+        most=12.0,
+        degrees="deg/s",
+    ),
     "accelerometer": Sensor(
-        unit="m/s^2", floor=1e-2, fault=0.2, bias=0.05, gain=0.01, most=80.0
-    ),  # bias: with the mounting
-    "position": Sensor(unit="m", floor=5e-4, fault=0.05),
+        unit="m/s^2",
+        floor=1e-2,
+        fault=0.2,
+        bias=0.05,  # with the mounting
+        drift=0.02,  # some degrees of warming, or 0.1 deg of a floor's tilt (assumption)
+        gain=0.01,
+        most=80.0,
+    ),
+    "position": Sensor(unit="m", floor=5e-4, fault=0.05, fastest=15.0),
     "velocity": Sensor(unit="m/s", floor=5e-4, fault=0.05, most=15.0),
     "heading": Sensor(unit="rad", floor=3e-4, fault=0.05, fastest=12.0, wraps=True, degrees="deg"),
     "tire": Sensor(unit="N", floor=0.3, fault=5.0),

@@ -12,15 +12,20 @@ from itertools import combinations
 
 import numpy as np
 
+from mjchair.diagnosis.data.trial_checks import averaged
 from mjchair.diagnosis.data.unit_checks import YAW, Story, at, forward, turning, wheel_pairs
 from mjchair.errors import MjchairError
 from mjchair.measurement.trial import Trial
 from mjchair.model.rolling import RearAxle
+from mjchair.simulation.inputs import Inputs
 
 # two stories are opposite where their sum is smaller than this share of the larger one
 LEFT_OVER = 0.4
 SPUN = 1.0  # rad/s rms by the wheels, which no gyroscope overlooks
 UNSEEN = 0.2  # of that turn, which another channel sees at most where a wheel's sign is wrong
+SWAPPED = 0.8  # cosine of a turning moment with what turns the chair, beyond which it is believed
+PUSHED = 0.3  # m/s, that a chair gains at PULLED or more only if something drives it, or downhill
+PULLED = 0.3  # m/s^2, as a slope of 3 %
 WORK = 40.0  # J that torques take from a chair, more than it lost: a sign may be wrong (assumption)
 SIDES = ("left", "right")
 
@@ -41,6 +46,9 @@ def check(trial: Trial, axle: RearAxle, mass: float) -> list[str]:
         wheels = stories.pop("wheels")
         for name, story in stories.items():
             _check_spin(trial, axle, (name, story), wheels)
+    if trial.inputs is None:
+        return _undriven(trial, axle)
+    _check_moment(trial, trial.inputs, turning(trial, axle))
     return _torque(trial, axle, mass)
 
 
@@ -84,6 +92,47 @@ def _check_spin(trial: Trial, axle: RearAxle, seen: tuple[str, Story], wheels: S
             f"{trial.name}: the wheels tell a turn of {told:.2g} rad/s, and {name} sees "
             f"{other:.2g}: does one of them count down as it rolls forward? Turn its sign"
         )
+
+
+def _check_moment(trial: Trial, inputs: Inputs, turns: dict[str, Story]) -> None:
+    """The right wheel's torque less the left one's turns the chair to the left.
+
+    What it does not spend on a faster turn, it spends on the turn itself.
+    """
+    if not {f"{side}_wheel" for side in SIDES} <= set(inputs.controls):
+        return
+    for name, story in turns.items():
+        grid, rate = story.time, story.values
+        if grid.size < 8 or np.sqrt(np.mean(rate**2)) < YAW:
+            continue
+        left, right = (
+            at(Story(*averaged(*inputs.samples(f"{side}_wheel")), ""), grid) for side in SIDES
+        )
+        moment = right - left
+        causes = np.column_stack([np.gradient(rate, grid), rate])
+        shares = np.linalg.lstsq(causes, moment, rcond=None)[0]
+        told = np.linalg.norm(causes @ shares) > SWAPPED * np.linalg.norm(moment)
+        if told and (shares < 0.0).all():
+            raise MjchairError(
+                f"{trial.name}: the torques turn the chair right where {name} turns left; are the "
+                "columns left_wheel and right_wheel swapped?"
+            )
+
+
+def _undriven(trial: Trial, axle: RearAxle) -> list[str]:
+    """A note where a chair gains speed that nothing gives it."""
+    for name, story in forward(trial, axle).items():
+        if story.time.size < 8:
+            continue
+        gains = np.gradient(story.values, story.time) > PULLED
+        gained = float(np.sum(np.diff(story.values)[gains[1:]]))
+        if gained > PUSHED:
+            return [
+                f"{trial.name}: by {name} it gains {gained:.2g} m/s and no torque is given, so it "
+                "is taken to coast; give left_wheel and right_wheel, or only what follows the last "
+                "push"
+            ]
+    return []
 
 
 def _torque(trial: Trial, axle: RearAxle, mass: float) -> list[str]:

@@ -2,7 +2,7 @@
 
 In: a trial, and the rear axle of the chair. Out: nothing, or one line that names the channel and
 the unit that it looks like. Three ways to know: no chair is that fast; two channels tell one story
-in two units, or of two lengths of the way; a level accelerometer shows gravity.
+in two units, or of two lengths of the way; a level accelerometer shows gravity, on one axis.
 """
 
 from __future__ import annotations
@@ -51,10 +51,11 @@ def check(trial: Trial, axle: RearAxle) -> None:
     _check_rates(trial, axle)
     _check_torque(trial)
     _check_gravity(trial)
-    _compare(trial, forward(trial, axle), FORWARD)
-    _compare(trial, turning(trial, axle), YAW)
+    _compare(trial, axle, forward(trial, axle), FORWARD)
+    _compare(trial, axle, turning(trial, axle), YAW)
     _compare_with_acceleration(trial, axle)
     _compare_with_way(trial, axle)
+    _check_places(trial)
 
 
 def check_initial(given: Mapping[str, object], name: str) -> None:
@@ -92,15 +93,23 @@ def _check_limits(trial: Trial, axle: RearAxle) -> None:
             continue
         limit, size = limit_of(name, kind.most, axle), _size(values)
         if size > limit:
-            what = "degrees" if kind.degrees and size <= DEGREES * limit else "other units"
+            what = _other_units(name) if size <= DEGREES * limit else "other units"
             why = f"it reaches {size:.3g}, and no chair passes {limit:.3g} in SI"
             _refuse(trial, name, what, why, kind.degrees)
+
+
+def _other_units(name: str) -> str:
+    """The units in place of SI that people use of a channel."""
+    kind = sensor(name)
+    if not kind.degrees:
+        return "other units"
+    return "deg/s or rpm" if rolls(name) and kind.unit == "rad/s" else "degrees"
 
 
 def _check_rates(trial: Trial, axle: RearAxle) -> None:
     for name in trial.channels:
         kind = sensor(name)
-        if kind.fastest is None:
+        if kind.fastest is None or kind.unit == "m":
             continue
         limit, story = limit_of(name, kind.fastest, axle), _rate(trial, name)
         fastest = _size(story.values) if story.values.size else 0.0
@@ -122,6 +131,12 @@ def _check_torque(trial: Trial) -> None:
 
 
 def _check_gravity(trial: Trial) -> None:
+    for name in ("imu_accelerometer.x", "imu_accelerometer.y"):
+        if name in trial.channels and abs(np.nanmedian(trial.channels[name])) > 0.5 * GRAVITY:
+            raise MjchairError(
+                f"{trial.name}: {name} stays near {np.nanmedian(trial.channels[name]):.2f}, as the "
+                "axis does that points up; x is forward, y left and z up: name the axes so"
+            )
     name = "imu_accelerometer.z"
     if name not in trial.channels:
         return
@@ -194,7 +209,7 @@ def at(story: Story, time: Array) -> Array:
     return np.interp(time, story.time, story.values) if story.time.size else np.zeros(time.size)
 
 
-def _compare(trial: Trial, stories: dict[str, Story], least: float) -> None:
+def _compare(trial: Trial, axle: RearAxle, stories: dict[str, Story], least: float) -> None:
     """Channels that tell one story must tell it in one unit."""
     for pair in combinations(stories, 2):
         grid = stories[pair[0]].time
@@ -208,6 +223,8 @@ def _compare(trial: Trial, stories: dict[str, Story], least: float) -> None:
         if DEGREES / NEAR < ratio < DEGREES * NEAR and stories[name].unit:
             why = f"it tells {ratio:.1f} times what {_article(other)} does"
             _refuse(trial, name, "degrees", why, stories[name].unit)
+        if other == "wheels" and 1.0 / NEAR < ratio * axle.left < NEAR and _speeds(trial):
+            _refuse_rolled(trial, axle, f"the wheels tell {1.0 / ratio:.2f} times what {name} does")
 
 
 def _compare_with_way(trial: Trial, axle: RearAxle) -> None:
@@ -228,10 +245,32 @@ def _compare_with_way(trial: Trial, axle: RearAxle) -> None:
         if metre / NEAR < gone / rolled < metre * NEAR:
             _refuse(trial, "position.x", unit, why, unit)
     if 1.0 / NEAR < gone / rolled * axle.left < NEAR and _speeds(trial):
-        raise MjchairError(
-            f"{trial.name}: {_speeds(trial)[0]} looks like m/s: the wheels roll {rolled:.3g} m by "
-            f"it where position goes {gone:.3g} m; divide it by the wheel's radius, {axle.left:g} m"
+        _refuse_rolled(
+            trial, axle, f"the wheels roll {rolled:.3g} m by it where position goes {gone:.3g} m"
         )
+    angles = [c for c in ("left_wheel_angle", "right_wheel_angle") if c in trial.channels]
+    if TURN / NEAR < gone / rolled < TURN * NEAR and angles:
+        _refuse(trial, angles[0], "turns", why, "rev")
+
+
+def _check_places(trial: Trial) -> None:
+    """No chair changes its place so fast as one in mm or cm seems to."""
+    for name in trial.channels:
+        kind = sensor(name)
+        if kind.unit != "m" or kind.fastest is None:
+            continue
+        story = _rate(trial, name)
+        fastest = _size(story.values) if story.values.size else 0.0
+        if fastest > kind.fastest:
+            why = f"it moves by {fastest:.3g} a second, and no chair passes {kind.fastest:g} m/s"
+            _refuse(trial, name, "mm or cm", why, "mm")
+
+
+def _refuse_rolled(trial: Trial, axle: RearAxle, why: str) -> NoReturn:
+    raise MjchairError(
+        f"{trial.name}: {_speeds(trial)[0]} looks like m/s: {why}; divide it by the wheel's "
+        f"radius, {axle.left:g} m"
+    )
 
 
 def _placed(trial: Trial) -> bool:
@@ -261,9 +300,18 @@ def _compare_with_acceleration(trial: Trial, axle: RearAxle) -> None:
     ramp = np.column_stack([np.ones(pull.time.size), pull.time])  # a slope's part, and a bias'
     speed, gained = (v - ramp @ np.linalg.lstsq(ramp, v, rcond=None)[0] for v in (speed, gained))
     sizes = np.linalg.norm(speed), np.linalg.norm(gained)
-    if sizes[0] < PULL * np.sqrt(speed.size) or speed @ gained < ALIKE * sizes[0] * sizes[1]:
+    if min(sizes) == 0.0:
         return
-    ratio = float(sizes[0] / sizes[1])
+    alike, ratio = float(speed @ gained / (sizes[0] * sizes[1])), float(sizes[0] / sizes[1])
+    moves = sizes[1] > PULL * np.sqrt(speed.size)
+    if moves and 1.0 / NEAR < ratio / axle.left < NEAR and alike > ALIKE:
+        _refuse_rolled(trial, axle, f"it changes {ratio:.2f} times as {name} says")
+    if sizes[0] < PULL * np.sqrt(speed.size) or abs(alike) < ALIKE:
+        return
+    if alike < 0.0:
+        raise MjchairError(
+            f"{trial.name}: {name} falls where {speeds[0]} rises: x is forward, so turn its sign"
+        )
     why = f"its speed changes {ratio:.1f} times as the accelerometer says"
     if DEGREES / NEAR < ratio < DEGREES * NEAR:
         _refuse(trial, speeds[0], "degrees", why, "deg/s")
