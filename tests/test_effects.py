@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import mjchair
+from mjchair.effects import bearing_friction, rolling_resistance
 from mjchair.effects.library import MECHANICAL, find, library, names
 from mjchair.errors import MjchairError
 
@@ -123,6 +124,33 @@ def test_rolling_resistance_slows_by_its_coefficient():
         speeds.append(run.channels["velocity.x"][-1])
     # rotating wheels add 2 % to the inertia of the chair
     assert (speeds[0] - speeds[1]) / 2.0 == pytest.approx(0.01 * 9.81, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("form", "values"),
+    [
+        (rolling_resistance.ONE_SIDED, {"left": 0.02, "right": 0.0}),
+        (bearing_friction.ONE_SIDED, {"left": 1.0, "right": 0.0}),
+    ],
+)
+def test_a_drag_on_one_side_turns_the_chair_there_and_mirrored_to_the_other(form, values):
+    """Of a soft tire or of what rubs on one wheel: half of what both do, and a turn to its side."""
+    bare = mjchair.load_spec()
+    mirrored = {"left": values["right"], "right": values["left"]}
+    both = dict.fromkeys(values, max(values.values()))
+    turns, losses = {}, {}
+    for name, put in (("left", values), ("right", mirrored), ("both", both), ("none", None)):
+        spec = bare.copy()
+        if put is not None:
+            form.apply(spec, put)
+        run = mjchair.simulate(spec, duration=2.0, initial=mjchair.Initial(speed=1.5))
+        turns[name] = float(np.asarray(run.channels["heading"])[-1])
+        losses[name] = 1.5 - float(np.asarray(run.channels["velocity.x"])[-1])
+    assert turns["left"] > 0.01
+    assert turns["left"] == pytest.approx(-turns["right"], rel=1e-6)
+    assert abs(turns["both"]) < 1e-3 * turns["left"]
+    of_one, of_both = (losses[n] - losses["none"] for n in ("left", "both"))
+    assert of_one == pytest.approx(0.5 * of_both, rel=0.05)
 
 
 def test_drag_is_the_same_in_plain_python_and_against_the_air():

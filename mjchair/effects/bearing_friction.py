@@ -1,6 +1,11 @@
-"""Friction in the bearings of the rear wheels, independent of the load."""
+"""Friction in the bearings of the rear wheels, independent of the load: of both, or of one alone.
+
+Two forms, one name: what ages brakes both wheels, and what rubs on one of them that one.
+"""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import mujoco
 
@@ -16,6 +21,12 @@ def edit(spec: mujoco.MjSpec, coulomb: float, viscous: float) -> None:
         joint.damping[0] += viscous  # [0] is linear in speed, the others are higher
 
 
+def of_one_side(spec: mujoco.MjSpec, left: float, right: float) -> None:
+    """Add `left` and `right` (N m) to the friction of the rear wheels' joints."""
+    for wheel, coulomb in zip(parts.REAR, (left, right), strict=True):
+        parts.named(spec.joints, wheel, "joint").frictionloss += coulomb
+
+
 EFFECT = Effect(
     name="bearing_friction",
     parameters=(
@@ -25,4 +36,16 @@ EFFECT = Effect(
     signature="torque on a rear wheel, independent of its load; a viscous part grows with speed",
     source="sizes assumed: a dragging brake is 0.1-1 N m, a dry hub less",
     edit=edit,
+)
+# of a power chair a brake that drags stands for a drag on one side
+ONE_SIDED = replace(
+    EFFECT,
+    parameters=(
+        Parameter("left", "N m", 0.5, 0.0, 20.0),
+        Parameter("right", "N m", 0.5, 0.0, 20.0),
+    ),
+    signature="torque on one rear wheel, independent of its load, which the chair turns towards",
+    source="sizes assumed: a brake shoe that touches the tire is 0.3-3 N m",
+    edit=of_one_side,
+    drive=False,
 )

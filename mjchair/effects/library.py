@@ -45,7 +45,9 @@ from mjchair.errors import MjchairError, nearest
 
 MECHANICAL = (
     rolling_resistance.EFFECT,
+    rolling_resistance.ONE_SIDED,
     bearing_friction.EFFECT,
+    bearing_friction.ONE_SIDED,
     air_drag.EFFECT,
     wind.EFFECT,
     floor_slope.EFFECT,

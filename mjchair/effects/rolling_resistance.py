@@ -1,6 +1,11 @@
-"""More (or less) rolling resistance under every wheel, in proportion to its load."""
+"""More (or less) rolling resistance: under every wheel, or under a rear wheel alone.
+
+Two forms, one name: a floor brakes every wheel in proportion to its load, and a soft tire its own.
+"""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import mujoco
 
@@ -8,17 +13,37 @@ from mjchair.effects.effect import Effect, Parameter
 from mjchair.model import parts
 from mjchair.tire import block
 
+LEAST, MOST = -0.015, 0.15
+
 
 def edit(spec: mujoco.MjSpec, coefficient: float) -> None:
     """Add `coefficient` (1) to the rolling resistance of all tires."""
     parts.add_to_tires(spec, block.ROLLING_RESISTANCE, coefficient)
 
 
+def of_one_side(spec: mujoco.MjSpec, left: float, right: float) -> None:
+    """Add `left` and `right` (1) to the rolling resistance of the rear tires."""
+    for wheel, added in zip(parts.REAR, (left, right), strict=True):
+        parts.add_to_tires(spec, block.ROLLING_RESISTANCE, added, (wheel,))
+
+
 EFFECT = Effect(
     name="rolling_resistance",
-    parameters=(Parameter("coefficient", "1", 0.005, -0.015, 0.15),),
+    parameters=(Parameter("coefficient", "1", 0.005, LEAST, MOST),),
     signature="-sign(v), in proportion to the load of each wheel, in any heading",
     source="whole chairs 0.006-0.02 (coast-down 0.0070, treadmill 0.0106), carpet up to 0.1",
     edit=edit,
     common=4.0,
+)
+# of a power chair a brake that drags stands for a drag on one side
+ONE_SIDED = replace(
+    EFFECT,
+    parameters=(
+        Parameter("left", "1", 0.01, LEAST, MOST),
+        Parameter("right", "1", 0.01, LEAST, MOST),
+    ),
+    signature="-sign(v), in proportion to the load of a rear wheel, which the chair turns towards",
+    source="a tire at a quarter of its pressure rolls about twice as hard; assumed",
+    edit=of_one_side,
+    drive=False,
 )
