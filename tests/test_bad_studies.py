@@ -202,7 +202,7 @@ CASES = {
                 "right_wheel": -5.0 * np.sin(2.0 * TIME) - 8.0 * np.cos(2.0 * TIME),
             }
         },
-        "the torques turn the chair right where imu_gyro.z turns left; are .* swapped",
+        "the torques turn the chair right where imu_gyro.z turns left; are .* swapped, or of",
     ),
     "torque in N mm": (
         {"columns": DRIVEN | {"left_wheel": 1000.0 * TORQUE}},

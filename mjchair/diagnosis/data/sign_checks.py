@@ -18,6 +18,7 @@ from mjchair.errors import MjchairError
 from mjchair.measurement.trial import Trial
 from mjchair.model.rolling import RearAxle
 from mjchair.simulation.inputs import Inputs
+from mjchair.simulation.table import Array
 
 # two stories are opposite where their sum is smaller than this share of the larger one
 LEFT_OVER = 0.4
@@ -101,22 +102,39 @@ def _check_moment(trial: Trial, inputs: Inputs, turns: dict[str, Story]) -> None
     """
     if not {f"{side}_wheel" for side in SIDES} <= set(inputs.controls):
         return
-    for name, story in turns.items():
-        grid, rate = story.time, story.values
-        if grid.size < 8 or np.sqrt(np.mean(rate**2)) < YAW:
-            continue
-        left, right = (
-            at(Story(*averaged(*inputs.samples(f"{side}_wheel")), ""), grid) for side in SIDES
+    against = [name for name, story in turns.items() if _turns_against(inputs, story)]
+    for_it = [name for name, story in turns.items() if _turns_with(inputs, story)]
+    if against and not for_it:
+        raise MjchairError(
+            f"{trial.name}: the torques turn the chair right where {against[0]} turns left; are "
+            "the columns left_wheel and right_wheel swapped, or of the other sign?"
         )
-        moment = right - left
-        causes = np.column_stack([np.gradient(rate, grid), rate])
-        shares = np.linalg.lstsq(causes, moment, rcond=None)[0]
-        told = np.linalg.norm(causes @ shares) > SWAPPED * np.linalg.norm(moment)
-        if told and (shares < 0.0).all():
-            raise MjchairError(
-                f"{trial.name}: the torques turn the chair right where {name} turns left; are the "
-                "columns left_wheel and right_wheel swapped?"
-            )
+
+
+def _moment_shares(inputs: Inputs, story: Story) -> Array:
+    """Of the moment of the torques, what goes with a faster turn, and with the turn, (2,).
+
+    Zero where the two do not make up the moment.
+    """
+    grid, rate = story.time, story.values
+    if grid.size < 8 or np.sqrt(np.mean(rate**2)) < YAW:
+        return np.zeros(2)
+    left, right = (
+        at(Story(*averaged(*inputs.samples(f"{side}_wheel")), ""), grid) for side in SIDES
+    )
+    moment = right - left
+    causes = np.column_stack([np.gradient(rate, grid), rate])
+    shares = np.linalg.lstsq(causes, moment, rcond=None)[0]
+    told = np.linalg.norm(causes @ shares) > SWAPPED * np.linalg.norm(moment)
+    return np.asarray(shares if told else np.zeros(2))
+
+
+def _turns_against(inputs: Inputs, story: Story) -> bool:
+    return bool((_moment_shares(inputs, story) < 0.0).all())
+
+
+def _turns_with(inputs: Inputs, story: Story) -> bool:
+    return bool((_moment_shares(inputs, story) > 0.0).any())
 
 
 def _undriven(trial: Trial, axle: RearAxle) -> list[str]:

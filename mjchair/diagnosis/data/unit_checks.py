@@ -309,11 +309,22 @@ def _compare_with_acceleration(trial: Trial, axle: RearAxle) -> None:
     if sizes[0] < PULL * np.sqrt(speed.size) or abs(alike) < ALIKE:
         return
     if alike < 0.0:
-        raise MjchairError(
-            f"{trial.name}: {name} falls where {speeds[0]} rises: x is forward, so turn its sign"
-        )
+        _refuse_backward(trial, name, speeds, axle)
+        return
     why = f"its speed changes {ratio:.1f} times as the accelerometer says"
     if DEGREES / NEAR < ratio < DEGREES * NEAR:
         _refuse(trial, speeds[0], "degrees", why, "deg/s")
     if GRAVITY / NEAR < ratio < GRAVITY * NEAR:
         _refuse(trial, name, "g", f"the wheels gain {ratio:.1f} times the speed that it tells", "g")
+
+
+def _refuse_backward(trial: Trial, name: str, speeds: list[str], axle: RearAxle) -> None:
+    """Refuse an accelerometer that points backward, unless the chair may turn on the spot."""
+    rolled = [_mean(trial, speed, axle.radius(speed.split("_")[0])) for speed in speeds]
+    grid = rolled[0].time
+    both = np.array([at(story, grid) for story in rolled])
+    turns = np.ptp(both, axis=0).max() if len(rolled) > 1 else 0.0
+    if turns < 0.5 * np.abs(both).max():  # the wheels roll alike, and nothing else accelerates
+        raise MjchairError(
+            f"{trial.name}: {name} falls where {speeds[0]} rises: x is forward, so turn its sign"
+        )
