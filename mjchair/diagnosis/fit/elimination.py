@@ -21,6 +21,7 @@ from mjchair.diagnosis.fit.whitening import Whitener
 from mjchair.diagnosis.replay.chair_state import SLOW, STEPS
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.diagnosis.replay.window_states import Track, prior, zero_columns
+from mjchair.measurement.sensors import sensor
 
 Array = NDArray[np.float64]
 RIDGE = 1e-9
@@ -108,13 +109,21 @@ def eliminate_window(
 def state_columns(simulator: WindowSimulator, track: Track, window: int) -> tuple[Array, Array]:
     """Columns (rows, channels, k) of what a window frees, and their prior precisions (k,).
 
-    These are its slow state and the zeros of the wheels' angles.
+    These are its slow state, the zeros of the wheels' angles, and what the biases of its sensors
+    differ by from those of the study. A bias stays for a run, and windows are eliminated one by
+    one, so each has its own, as many times larger in variance as the run has windows: the mean over
+    the run is then known as well as it is.
     """
     dynamic = track.slow[window]
     assert dynamic.shape[2] == len(SLOW)
-    zeros = zero_columns(simulator)
-    free = np.broadcast_to(zeros, (dynamic.shape[0], *zeros.shape))
+    zeros, drift = zero_columns(simulator), np.array([sensor(c).drift for c in simulator.channels])
+    drifting = np.eye(len(drift))[:, drift > 0.0]
+    fixed = np.hstack([zeros, drifting])
+    free = np.broadcast_to(fixed, (dynamic.shape[0], *fixed.shape))
+    alike = sum(w.run == simulator.windows[window].run for w in simulator.windows)
     spread = np.r_[
-        prior(simulator, window, track.states[window]) / STEPS, np.full(zeros.shape[1], ANY_ZERO)
+        prior(simulator, window, track.states[window]) / STEPS,
+        np.full(zeros.shape[1], ANY_ZERO),
+        np.sqrt(alike) * drift[drift > 0.0],
     ]
     return np.concatenate([dynamic, free], axis=2), 1.0 / spread**2
