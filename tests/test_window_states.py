@@ -1,5 +1,6 @@
 """How far the slow state of a window is fitted, on numbers alone: nothing is simulated."""
 
+import contextlib
 from types import SimpleNamespace
 
 import numpy as np
@@ -137,3 +138,36 @@ def test_what_a_window_cannot_tell_is_not_simulated(placed, monkeypatch):
     (answers,) = window_states._answers(simulator, None, errors, states, 0.5).values()
     expected = np.where(np.arange(len(SLOW)) < 2, STEPS * placed, STEPS)  # a caster is told later
     np.testing.assert_allclose(answers, np.broadcast_to(expected, (4, 2, len(SLOW))))
+
+
+def test_the_states_of_a_hopeless_chair_are_not_sought(monkeypatch):
+    """Casters that turn over and over cost 16 simulations a window, and no state helps."""
+    rounds, misfit = [], [0.0]
+    before = window_states.Track([np.zeros(2)], [np.zeros((4, 2))], ["kept"], [{}])
+    shown = SimpleNamespace(predicted=np.full((4, 2), 1e4), trace={})
+    monkeypatch.setattr(window_states, "installed", contextlib.nullcontext)
+    monkeypatch.setattr(window_states, "SensorErrors", lambda _: SimpleNamespace())
+    monkeypatch.setattr(window_states, "_stands", lambda *_: False)
+    monkeypatch.setattr(window_states, "_traced", lambda *_: {0: shown})
+    monkeypatch.setattr(window_states, "_size", lambda _s, _w, seen, _n: float(seen.sum()))
+
+    def one(simulator, models, errors, going, *rest):
+        rounds.append(len(going))
+        for search in going.values():
+            search.judge(misfit[0], shown.predicted, {})
+
+    monkeypatch.setattr(window_states, "_fit_round", one)
+    simulator = SimpleNamespace(
+        channels=CHANNELS,
+        windows=[SimpleNamespace(index=0, rows=np.arange(4))],
+        coarsened=lambda model: model,
+    )
+    errors = SimpleNamespace(applied=lambda _simulator, _window, predicted: predicted)
+    noise = dict.fromkeys(CHANNELS, SimpleNamespace(total=1.0))
+    limit = window_states.HOPELESS * 8.0  # samples: the chair before misses none
+    for size, expected in ((0.9 * limit, window_states.ROUNDS), (1.1 * limit, 1)):
+        rounds.clear()
+        misfit[0] = size
+        found = window_states.track(simulator, "model", noise, errors, before)
+        assert len(rounds) == expected
+        assert found.states[0] is not before.states[0] and (found.predicted[0] == 1e4).all()

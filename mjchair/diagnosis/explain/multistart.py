@@ -156,7 +156,18 @@ class MultiStart:
             return self.near.refit(self.hypothesis.starts, rounds, self.part, reach)
         terms = hypotheses.terms(base.reduced, self.hypothesis, share)
         start = replace(base.around.variant, terms=terms)
-        return refit(base.bench, start, base.around.track, base.nuisances, rounds, self.part, reach)
+        return refit(
+            base.bench,
+            start,
+            base.around.track,
+            base.nuisances,
+            rounds,
+            self.part,
+            reach,
+            base.reduced.total
+            if rounds
+            else np.inf,  # without rounds the start itself is asked for
+        )
 
     def _terms(self) -> tuple[Term, ...]:
         """The effects with the values that linear algebra promises."""

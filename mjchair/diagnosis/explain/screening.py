@@ -26,7 +26,7 @@ from mjchair.diagnosis.fit.column_ids import ColumnId
 from mjchair.diagnosis.fit.nonlinear import Fitted, on_bound, refit
 from mjchair.diagnosis.fit.parameter_columns import nuisance_columns
 from mjchair.diagnosis.fit.system import System
-from mjchair.diagnosis.fit.variant import Variant
+from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.replay import noise, noise_left
 from mjchair.diagnosis.replay.cache import Store
 from mjchair.diagnosis.replay.derivatives import Column
@@ -254,11 +254,23 @@ def _holding(
     Args:
       made: takes what each other fit leaves, with its penalty, and the fit.
     """
+    known: dict[int, Term] = {}  # where effects ended that linear algebra puts on a bound
     for h in options:
-        start = replace(base.around.variant, terms=hypotheses.terms(reduced, h))
+        terms = [
+            known.get(id(t.effect), t) if on_bound(t) else t for t in hypotheses.terms(reduced, h)
+        ]
+        start = replace(base.around.variant, terms=tuple(terms))
         reach = rules.short_of(promised=reduced.total - h.gain, gain=h.gain)
         try:
-            fitted = refit(bench, start, base.around.track, base.nuisances, ROUNDS, reach=reach)
+            fitted = refit(
+                bench,
+                start,
+                base.around.track,
+                base.nuisances,
+                ROUNDS,
+                reach=reach,
+                nothing=reduced.total,
+            )
         except (MjchairError, np.linalg.LinAlgError):
             continue  # these effects this chair cannot have
         found = Found(h.starts, fitted)
@@ -267,6 +279,7 @@ def _holding(
         if settled and fitted.total < reach and not pushed:
             return found
         made.append((fitted.total + h.penalty, found))
+        known |= {id(t.effect): t for t in fitted.variant.terms}
     return None
 
 

@@ -32,6 +32,7 @@ from mjchair.errors import MjchairError
 
 Array = NDArray[np.float64]
 ROUNDS = 12  # at most, of Gauss-Newton
+ASTRAY = 2.0  # times the chi2 without effects, above which they are too large
 FEW = 3  # of these, after which a fit that has gone astray is not followed
 SHORTEST = 1.0 / 32.0  # of a step: where that fails as well, none is believed
 SHORTER = (0.1, 0.5)  # of a step that fails: the least and the most that is tried next
@@ -90,6 +91,7 @@ def refit(
     rounds: int = ROUNDS,
     part: Fitted | None = None,
     reach: float = np.inf,
+    nothing: float = np.inf,
 ) -> Fitted:
     """Nonlinear fit of nuisances and effects within bounds: Gauss-Newton with a line search.
 
@@ -101,6 +103,8 @@ def refit(
       part: a fit of some of the effects; None: none is known. With more effects nothing fits worse,
         so a start that does is moved towards it, and a fit that still does after a few rounds has
         gone astray.
+      nothing: chi2 of the best chair without effects. It stands for a part, where there is none and
+        a start is ASTRAY times as bad.
       reach: chi2 that must be promised after a round; a fit that promises more ends there.
 
     Raises:
@@ -113,9 +117,9 @@ def refit(
         before = track(simulator, model, bench.noise, errors, before, anew=True)
         nuisances = nuisance_columns(bench, before, start)
     here = _placed(bench, start, before, nuisances)
-    most = np.inf if part is None else part.total
-    if part is not None and here.total > most:
-        here = _nearer(bench, here, part, before, nuisances)
+    most = ASTRAY * nothing if part is None else part.total
+    if here.total > most:
+        here = _nearer(bench, here, _least(here.variant, part), most, before, nuisances)
     best = _around(bench, here, nuisances)
     variant = _after_linear_step(bench, best)
     share, fails = 1.0, 0  # of the linear step, that is tried
@@ -146,30 +150,40 @@ def refit(
     return best
 
 
+def _least(variant: Variant, part: Fitted | None) -> Variant:
+    """A variant with the effects of a part of it, as they were fitted, and the others neutral."""
+    known = {} if part is None else {id(term.effect): term for term in part.variant.terms}
+    terms = tuple(
+        replace(t, values=known[id(t.effect)].values) if id(t.effect) in known else _neutral(t)
+        for t in variant.terms
+    )
+    offsets = variant.offsets if part is None else part.variant.offsets
+    return replace(variant, offsets=offsets, terms=terms)
+
+
 def _nearer(
     bench: Bench,
     here: Placed,
-    part: Fitted,
+    least: Variant,
+    most: float,
     before: Track | None,
     nuisances: dict[ColumnId, Column],
 ) -> Placed:
-    """A place between a start and a part of its effects that fits as well as that, or the best.
+    """A place between a start and less of its effects that fits as well as these, or the best.
 
     The size that linear algebra promises of an effect may be absurd: a tire without friction.
+
+    Args:
+      least: with less of the effects. most: its chi2.
     """
-    known = {term.effect.key: term for term in part.variant.terms}
-    terms = tuple(
-        replace(t, values=known[t.effect.key].values) if t.effect.key in known else _neutral(t)
-        for t in here.variant.terms
-    )
-    least, far = replace(here.variant, offsets=part.variant.offsets, terms=terms), here.variant
+    far = here.variant
     for share in NEARER:
         try:
             there = _placed(bench, _between(least, far, share), before, nuisances)
         except (MjchairError, np.linalg.LinAlgError):  # of what no chair can be
             continue
         here = min(here, there, key=attrgetter("total"))
-        if here.total <= part.total:
+        if here.total <= most:
             break
     return here
 

@@ -34,6 +34,8 @@ FINER = 0.1  # of the steps of finite differences, where a step of the fit faile
 # of misfit, in variances of the sensors' noise, that the step of a round promises
 PROMISE = 4.0  # from which answers to the slow state are made anew where it led
 CALM = 0.1  # below which it is not taken: the elimination of the state does as much
+# times the misfit of the chair before: above it no state helps, as where casters turn over and over
+HOPELESS = 100.0
 
 
 @dataclass
@@ -156,8 +158,11 @@ def track(
             members = by_index[index]
             search = {i: Search(states[i], states[i], touchy=i in touchy) for i in members}
             going = search
+            most = _most(simulator, before, members, white) if before and kept else np.inf
             # answers that are kept from another chair would lead further rounds astray
             for round_ in range(ROUNDS + MORE):
+                if round_ and sum(s.size for s in search.values()) > most:
+                    break
                 going = {
                     i: s
                     for i, s in going.items()
@@ -178,6 +183,15 @@ def track(
                 if before is None:
                     _hand_over(simulator, model, i, s.trace, states)
     return Track(states, predicted, slow, traces, touchy=frozenset(touchy))
+
+
+def _most(
+    simulator: WindowSimulator, before: Track, members: Collection[int], white: Array
+) -> float:
+    """Misfit of windows above which the states of a chair near by are not sought any further."""
+    known = sum(_size(simulator, simulator.windows[i], before.predicted[i], white) for i in members)
+    samples = sum(simulator.windows[i].rows.size for i in members) * len(white)
+    return HOPELESS * max(known, float(samples))
 
 
 def _begun(simulator: WindowSimulator) -> list[State]:
