@@ -55,7 +55,7 @@ def test_what_closes_little_of_a_held_out_gap_is_an_answer_beside_which_more_is_
     """A drag of the air that closed 97 % of a gap, and 36 % held out, was no answer at all."""
     held = HeldOut(before=264.0, after=216.0, dof=130.0, changed=317.0)
     assert said(held_out=held) == Verdict.AMBIGUOUS
-    assert rules.more_missing(replace(CLEAR, held_out=held), walls=0)
+    assert rules.more_missing(replace(CLEAR, held_out=held))
     assert said(held_out=replace(held, after=196.0)) == Verdict.NAMED
     assert said(held_out=replace(held, after=265.0)) == Verdict.UNKNOWN
 
@@ -158,7 +158,7 @@ def test_a_chair_that_foretells_wrongly_is_no_answer(chi2, wrong):
     """Twice three standard deviations of 100 degrees of freedom are 85."""
     assert rules.foretells_wrongly(chi2, 100.0) == wrong
     held = HeldOut(before=190.0, after=chi2, dof=100.0, changed=20.0)
-    assert rules.more_missing(replace(CLEAR, held_out=held), walls=0) == wrong
+    assert rules.more_missing(replace(CLEAR, held_out=held)) == wrong
 
 
 def share(**changes):
@@ -222,10 +222,10 @@ def test_a_hypothesis_near_the_best_is_fitted_too():
 
 
 def test_what_an_answer_leaves_is_said():
-    assert not rules.more_missing(CLEAR, walls=0)
-    assert rules.more_missing(CLEAR, walls=1)
-    assert rules.more_missing(replace(CLEAR, gap_left=True), walls=0)
-    assert rules.more_missing(replace(CLEAR, closure=rules.CLOSES - 0.01), walls=0)
+    assert not rules.more_missing(CLEAR)
+    assert rules.more_missing(replace(CLEAR, walls=1))
+    assert rules.more_missing(replace(CLEAR, gap_left=True))
+    assert rules.more_missing(replace(CLEAR, closure=rules.CLOSES - 0.01))
 
 
 @pytest.mark.parametrize(
@@ -443,3 +443,9 @@ def test_paired_errors_count_windows_not_samples():
     expected = difference.mean() / (difference.std(ddof=1) / np.sqrt(40))
     assert rules.paired_errors(theirs, ours) == pytest.approx(expected)
     assert rules.paired_errors(np.array([12.0]), np.array([5.0])) == 7.0
+
+
+def test_what_leaves_a_number_on_its_wall_is_not_named_alone():
+    """What pushes the number there may be all that is missing."""
+    assert rules.verdict(True, CLEAR) == Verdict.NAMED
+    assert rules.verdict(True, replace(CLEAR, walls=1)) == Verdict.AMBIGUOUS

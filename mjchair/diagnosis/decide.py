@@ -94,11 +94,13 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     left = missing(choice.after if choice else gap)
     undecided = named if said == Verdict.AMBIGUOUS else None
     once = bool(stands and stands.once)
-    plan, unplanned = _plan(base, undecided, once) if undecided else (None, [])
+    sets = _alternatives(undecided, once) if undecided else []
+    pushed = bool(stands and stands.walls and not sets)  # to be measured, and not separated
+    plan, unplanned = _plan(base, undecided, once) if undecided and not pushed else (None, [])
     return Diagnosis(
         verdict=said,
         effects=_named(named.fitted, closed) if named else [],
-        alternatives=_alternatives(undecided, once) if undecided else [],
+        alternatives=sets,
         candidates=_candidates(base, gap, choice),
         gap=_summary(base, gap, named, stands.held_out if stands else None),
         where=_where(base),
@@ -107,7 +109,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         drivers=left,
         nearest=_nearest(base, choice, closed) if choice and said == Verdict.UNKNOWN else None,
         probability=probability,
-        more_missing=bool(named and stands and rules.more_missing(stands, _walls(named.fitted))),
+        more_missing=bool(named and stands and rules.more_missing(stands)),
         material=size,
         process=_process(base),
         terms=named.fitted.variant.terms if named else (),
@@ -148,6 +150,7 @@ def standing(
         once=_once(base, choice, held),
         runs=len(base.bench.simulator.study.fitted),
         held_out=held,
+        walls=_walls(fitted),
     )
 
 
@@ -232,6 +235,9 @@ def _following(
         if lone is not None:
             return wording.letting_in(*lone)
         return wording.searching([(force.goes_with, force.sigmas) for force in left])
+    if said == Verdict.AMBIGUOUS and choice is not None:
+        known = choice.fitted.variant.known_roughly
+        return wording.measuring([(n, by) for n, by in known if rules.is_far(by)])
     if said == Verdict.NONE:
         known = base.plain.variant.known_roughly
         return wording.measuring([(n, by) for n, by in known if rules.is_far(by)])

@@ -124,6 +124,8 @@ class Standing:
         and all else. once: whether something that happened once fits as well.
       runs: that were fitted to.
       held_out: the trials that no fit saw; None where there are none.
+      walls: how many numbers that are only roughly known stand on their walls with the effects in:
+        they are where what is missing pushed them.
     """
 
     closure: float
@@ -136,6 +138,7 @@ class Standing:
     once: bool = False
     runs: int = 2
     held_out: HeldOut | None = None
+    walls: int = 0
 
 
 def gap_exists(p: float, sigmas: float, gain: float = 0.0) -> bool:
@@ -167,7 +170,8 @@ def verdict(gap: bool, choice: Standing | None) -> Verdict:
         return Verdict.NONE
     if choice is None or not explains(choice):
         return Verdict.UNKNOWN
-    alone = not choice.once and choice.probability >= PROBABLE
+    # beside a number that is pushed to its wall, what pushes it may be all that is missing
+    alone = not choice.once and choice.probability >= PROBABLE and not choice.walls
     # in a single run nothing tells an effect from what is left beside it
     whole = not choice.gap_left or choice.runs > 1
     carried = choice.held_out is None or carries_over(choice.held_out)
@@ -250,16 +254,11 @@ def closure(
     return float(np.clip(share, 0.0, 1.0))
 
 
-def more_missing(choice: Standing, walls: int) -> bool:
-    """Whether an answer leaves something that is no noise.
-
-    Args:
-      walls: how many numbers that are only roughly known stand on their walls: they are where what
-        is missing pushed them.
-    """
+def more_missing(choice: Standing) -> bool:
+    """Whether an answer leaves something that is no noise."""
     held = choice.held_out
     wrong = held is not None and (foretells_wrongly(held.after, held.dof) or not carries_over(held))
-    return choice.gap_left or choice.closure < CLOSES or walls > 0 or wrong
+    return choice.gap_left or choice.closure < CLOSES or choice.walls > 0 or wrong
 
 
 def matters(
