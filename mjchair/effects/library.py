@@ -55,6 +55,7 @@ MECHANICAL = (
     camber.EFFECT,
     mass_offset.EFFECT,
     payload.EFFECT,
+    payload.ALONG,
     wheel_radius.EFFECT,
     wheel_radius.TWISTING,
     cornering_stiffness.EFFECT,
