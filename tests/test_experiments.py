@@ -227,6 +227,21 @@ def test_a_rehearsal_counts_the_turns_of_a_heading_over_its_windows(one_way):
         assert after == pytest.approx(before, abs=0.2)
 
 
+def test_what_a_chair_does_as_it_comes_to_rest_promises_nothing(one_way):
+    """A diagnosis leaves it out: a slow coast promised 25 sigmas there, and brought none."""
+    _, _, bench, (rolling, slope, _) = one_way
+    here, stopping = setting(bench.simulator.study), replace(BY_NAME["slow coast"], speed=0.25)
+    made = Rehearsal(bench, here, [stopping], Version(rolling.variant))
+    speed = made.whole(made.chair, 0)[:, list(made.simulator.channels).index("left_wheel_speed")]
+    time, used = made.simulator.study.runs[0].trial.time, made.used(0)
+    rests = float(time[np.argmax(np.abs(speed) < 0.05)])
+    assert 1.0 < rests < stopping.seconds - 0.5
+    assert used[(time > 0.3) & (time < rests - 0.3)].all()
+    assert not used[(time > rests) & (time < rests + 1.0)].any()
+    (seen,) = design.plan(bench, rolling, [slope], [stopping], doubts=()).evidence
+    assert used[np.argmin(np.abs(time - seen.time))]
+
+
 def test_a_chair_that_is_shaken_promises_less(one_way, against_slope):
     _, _, bench, (rolling, slope, _) = one_way
     asked = pulses(bench.simulator)

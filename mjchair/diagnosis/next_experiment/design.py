@@ -254,7 +254,7 @@ def _evidence(
     width = max(1, min(round(SMOOTH / float(time[1] - time[0])), time.size))
     mean = np.ones(width) / width
     noise = np.array([bench.noise[c].total for c in channels])
-    apart = residual(theirs, ours, channels)
+    apart = residual(theirs, ours, channels) * rehearsal.used(which)[:, None]
     apart, ours = (
         np.column_stack([np.convolve(v, mean, mode="valid") for v in values.T])
         for values in (apart, ours)

@@ -113,8 +113,9 @@ class Rehearsal:
         if len(whole) < len(traces):
             self.manoeuvres = [self.manoeuvres[i] for i in whole]
             self.first = [self.first[i] for i in whole]
-            self._plan(bench, setting)
             made = [made[i] for i in whole]
+        # cut as they will be once they are measured: without what a chair does as it comes to rest
+        self._plan(bench, setting, [o.predicted for o in made])
         self.simulator.turned = [
             {i: o.predicted[:, i] for i in turned}
             for o, turned in zip(made, self.simulator.turned, strict=True)
@@ -123,10 +124,14 @@ class Rehearsal:
         self.track = self._track(chair, [o.trace for o in made])
         self.process = None if bench.process is None else self._shaken(bench, bench.process)
 
-    def _plan(self, bench: Bench, setting: Setting) -> None:
+    def _plan(self, bench: Bench, setting: Setting, shown: Sequence[Array] = ()) -> None:
+        """Cut the manoeuvres into windows; `shown` is what the channels show of each, if known."""
         source = bench.simulator.study
         every = _step(source)
-        runs = tuple(_planned(source, setting, m, every) for m in self.manoeuvres)
+        runs = tuple(
+            _planned(source, setting, m, every, shown[i] if shown else None)
+            for i, m in enumerate(self.manoeuvres)
+        )
         study = replace(source, runs=runs)
         self.simulator = WindowSimulator(study)
         windows = [
@@ -171,6 +176,14 @@ class Rehearsal:
         slow = np.hypot(trace["qvel"][:, v], trace["qvel"][:, v + 1]) < FASTEST
         repeats = np.abs(nudged["qvel"][:, v + 5] - trace["qvel"][:, v + 5]) < GROWN * NUDGE
         return bool((upright & slow & repeats).all())
+
+    def used(self, which: int) -> NDArray[np.bool_]:
+        """Which samples of a manoeuvre a diagnosis uses, (samples,)."""
+        out = np.zeros(self.simulator.study.runs[which].trial.time.size, bool)
+        for w in self.simulator.windows:
+            if w.run == which:
+                out[w.rows] = True
+        return out
 
     def whole(self, chair: Version, which: int) -> Array:
         """What the channels of a chair show of one whole manoeuvre, (samples, channels)."""
@@ -251,10 +264,13 @@ def _step(study: Study) -> float:
     return float(np.median([np.median(np.diff(r.trial.time)) for r in study.runs]))
 
 
-def _planned(study: Study, setting: Setting, manoeuvre: Manoeuvre, every: float) -> Run:
-    """A run with nothing but zeros in its channels, a sample `every` (s)."""
+def _planned(
+    study: Study, setting: Setting, manoeuvre: Manoeuvre, every: float, shown: Array | None
+) -> Run:
+    """A run of a manoeuvre, a sample `every` (s); nothing but zeros in channels not yet `shown`."""
     time = np.arange(0.0, manoeuvre.seconds, every)
-    channels = {c: np.zeros(time.size) for c in study.channels}
+    values = np.zeros((time.size, len(study.channels))) if shown is None else shown
+    channels = {c: values[:, i].copy() for i, c in enumerate(study.channels)}
     trial = Trial(manoeuvre.name, time, channels, setting.inputs(manoeuvre), {})
     initial = setting.initial(manoeuvre)
     return Run(trial, manoeuvre.name, False, initial, frozenset(), manoeuvre.load)
