@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ from mjchair.diagnosis.explain.left_out import (
 )
 from mjchair.diagnosis.explain.probability import of_any, of_effects, probabilities, with_gap
 from mjchair.diagnosis.explain.rivals import exchanged, with_probable
+from mjchair.diagnosis.explain.run_by_run import Uneven, uneven
 from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import ParameterId
@@ -70,7 +72,9 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     closed = closure(gap, base, choice.fitted, choice.after) if choice else 0.0
     probability = probabilities(base, choice)
     choice = with_probable(choice, probability) if choice else None
+    differing = uneven(base.bench, choice.fitted, choice.brought) if choice else []
     stands = standing(base, choice, closed, probability) if choice else None
+    stands = replace(stands, uneven=bool(differing)) if stands else None
     said = rules.verdict(gap.exists, stands)
     forces = missing_forces(base)
     size = material(base, gap, choice)
@@ -105,7 +109,11 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         gap=_summary(base, gap, named, stands.held_out if stands else None),
         where=_where(base),
         next_experiment=_following(base, choice, said, plan, left),
-        notes=[*_notes(base, choice, closed, said, left), *unplanned],
+        notes=[
+            *_notes(base, choice, closed, said, left),
+            *(_differs(d) for d in differing if named),
+            *unplanned,
+        ],
         drivers=left,
         nearest=_nearest(base, choice, closed) if choice and said == Verdict.UNKNOWN else None,
         probability=probability,
@@ -116,6 +124,17 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         correction=named.fitted.variant if named else None,
         evidence=evidence(base, named.fitted if named else None, plan, forces),
         stages=Stages(base=base, gap=gap, choice=choice),
+    )
+
+
+def _differs(one: Uneven) -> str:
+    """That an effect is not of one size."""
+    least, most = (
+        f"{size.value:.3g} ± {size.std:.1g} in {size.run}" for size in (one.least, one.most)
+    )
+    return (
+        f"{one.effect} is not of one size in these runs: its {one.parameter} is {most} and "
+        f"{least}; it may act in some of them only, as a brake that rubs or another floor does"
     )
 
 

@@ -13,6 +13,7 @@ from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 Array = NDArray[np.float64]
 
@@ -63,6 +64,8 @@ SHOWS = 2.0  # standard deviations of the whole residual: less is no more than n
 CERTAIN = 10.0  # standard errors beyond which an effect is named whatever its size
 MATERIAL = 0.12  # of the chair's own rolling resistance: a force that matters (assumption)
 LONE = 3.0  # times what any run of the fit leaves: only a held-out run shows it (assumption)
+# what is not of one size in all runs: share of what an effect brings, and the chance of noise
+UNEVEN, BY_CHANCE = 0.1, 1e-4
 # what happens once
 CARRIES = 0.8  # share of the gain that an event must bring to stand beside an effect
 # what is believed of a parameter
@@ -126,6 +129,7 @@ class Standing:
       held_out: the trials that no fit saw; None where there are none.
       walls: how many numbers that are only roughly known stand on their walls with the effects in:
         they are where what is missing pushed them.
+      uneven: whether an effect is not of one size in all runs.
     """
 
     closure: float
@@ -139,6 +143,7 @@ class Standing:
     runs: int = 2
     held_out: HeldOut | None = None
     walls: int = 0
+    uneven: bool = False
 
 
 def gap_exists(p: float, sigmas: float, gain: float = 0.0) -> bool:
@@ -254,11 +259,23 @@ def closure(
     return float(np.clip(share, 0.0, 1.0))
 
 
+def differs_by_run(*, gained: float, free: int, brought: float) -> bool:
+    """Whether an effect is not of one size in all runs.
+
+    Args:
+      gained: chi2 by sizes of their own. free: how many more these are.
+      brought: chi2 that the effect brings; no form is so right that it is the same to the last.
+    """
+    if free < 1 or gained < UNEVEN * brought:
+        return False
+    return bool(stats.chi2.sf(max(gained, 0.0), free) < BY_CHANCE)
+
+
 def more_missing(choice: Standing) -> bool:
     """Whether an answer leaves something that is no noise."""
     held = choice.held_out
     wrong = held is not None and (foretells_wrongly(held.after, held.dof) or not carries_over(held))
-    return choice.gap_left or choice.closure < CLOSES or choice.walls > 0 or wrong
+    return choice.gap_left or choice.closure < CLOSES or choice.walls > 0 or choice.uneven or wrong
 
 
 def matters(
