@@ -13,10 +13,12 @@ CHANNELS = ("left_wheel_speed", "imu_gyro.z", "imu_accelerometer.x")
 ROWS = 40
 
 
-def simulator(count):
+def simulator(count, nuisance=None):
     """A study of one run of some windows, and of another of one."""
     windows = [SimpleNamespace(run=0) for _ in range(count)] + [SimpleNamespace(run=1)]
-    return SimpleNamespace(channels=CHANNELS, windows=windows)
+    return SimpleNamespace(
+        channels=CHANNELS, windows=windows, study=SimpleNamespace(nuisance=nuisance or {})
+    )
 
 
 @pytest.mark.parametrize("count", [1, 4])
@@ -43,3 +45,11 @@ def test_a_force_that_only_the_level_of_an_accelerometer_shows_is_not_surer_with
         free, precision = one[:, None], np.array([drift**-2])
         known.append(elimination.eliminate(one, one[:, None], free, precision).G[0, 0] ** -0.5)
     assert known[1] == pytest.approx(drift, rel=1e-2) and known[1] > 0.95 * known[0]
+
+
+def test_a_study_says_how_far_its_sensors_drift(monkeypatch):
+    monkeypatch.setattr(elimination, "prior", lambda *_: np.ones(len(SLOW)))
+    track = SimpleNamespace(slow=[np.zeros((ROWS, 3, len(SLOW)))] * 2, states=[None] * 2)
+    known = simulator(1, {"drift:imu_accelerometer": 0.1, "drift:imu_gyro": 0.0})
+    free, precision = elimination.state_columns(known, track, 0)
+    assert free.shape[2] == len(SLOW) + 1 and precision[-1] == pytest.approx(0.1**-2)

@@ -142,12 +142,21 @@ def nuisances(
       MjchairError: a name that is not a nuisance.
     """
     every = _usual(channels, given, driven_as_measured)
-    vectors = {"imu_gyro", "imu_accelerometer"}
-    known = {n.name for n in every} | {f"{what}:{v}" for what in ("bias", "scale") for v in vectors}
+    vectors, kinds = ("imu_gyro", "imu_accelerometer"), ("bias", "scale", "drift")
+    known = {n.name for n in every} | {f"{kind}:{v}" for kind in kinds for v in vectors}
     for name in given:
         if name not in known:
             raise MjchairError(f"unknown nuisance {name!r}" + nearest(name, known))
     return tuple(replace(n, std=_given(n, given)) for n in every)
+
+
+def drift(channel: str, given: Mapping[str, float]) -> float:
+    """Standard deviation of what a channel's bias changes by from run to run, SI; 0: it stays.
+
+    Args:
+      given: by a study, for a sensor as a whole.
+    """
+    return given.get(f"drift:{channel.rsplit('.', 1)[0]}", sensor(channel).drift)
 
 
 def mistaken(

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from mjchair.diagnosis.data import roughly_known
 from mjchair.diagnosis.fit.process import Process
 from mjchair.diagnosis.fit.whitening import Whitener
 from mjchair.diagnosis.replay.chair_state import SLOW, STEPS
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.diagnosis.replay.window_states import Track, prior, zero_columns
-from mjchair.measurement.sensors import sensor
 
 Array = NDArray[np.float64]
 RIDGE = 1e-9
@@ -116,7 +116,8 @@ def state_columns(simulator: WindowSimulator, track: Track, window: int) -> tupl
     """
     dynamic = track.slow[window]
     assert dynamic.shape[2] == len(SLOW)
-    zeros, drift = zero_columns(simulator), np.array([sensor(c).drift for c in simulator.channels])
+    zeros, given = zero_columns(simulator), simulator.study.nuisance
+    drift = np.array([roughly_known.drift(c, given) for c in simulator.channels])
     drifting = np.eye(len(drift))[:, drift > 0.0]
     fixed = np.hstack([zeros, drifting])
     free = np.broadcast_to(fixed, (dynamic.shape[0], *fixed.shape))
