@@ -1,11 +1,14 @@
 """Which explanation the noise of a study is taken around; levels are told instead of estimated."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
 from mjchair.diagnosis.explain import screening
 from mjchair.diagnosis.explain.screening import LOUD, QUIETER
+from mjchair.diagnosis.fit.variant import Term
+from mjchair.effects.effect import Effect, Parameter
 from mjchair.errors import MjchairError
 
 
@@ -73,7 +76,7 @@ def told(total, promised=None, bound=(), offset=0.0):
         total=total,
         promised=total if promised is None else promised,
         at_bound=bound,
-        variant=SimpleNamespace(offsets={"mass": offset}),
+        variant=SimpleNamespace(offsets={"mass": offset}, terms=()),
     )
 
 
@@ -118,7 +121,7 @@ def around_which(monkeypatch, fits, on_bound=(), count=None):
     """
     answers = iter(fits)
 
-    def refit(*_, reach):
+    def refit(*_, reach, nothing):
         # linear algebra leaves 300; what promises to miss a tenth of the gain is not followed
         assert reach == pytest.approx(300.0 + 0.1 * 1e6)
         answer = next(answers)
@@ -128,6 +131,7 @@ def around_which(monkeypatch, fits, on_bound=(), count=None):
 
     monkeypatch.setattr(screening, "refit", refit)
     monkeypatch.setattr(screening.hypotheses, "terms", lambda _, h: h.starts)
+    monkeypatch.setattr(screening, "_off_bounds", lambda terms, ended: terms)
     monkeypatch.setattr(screening, "on_bound", lambda k: k in on_bound)
     monkeypatch.setattr(screening, "replace", lambda variant, **_: variant)
     options = [
@@ -139,3 +143,16 @@ def around_which(monkeypatch, fits, on_bound=(), count=None):
     reduced = SimpleNamespace(total=1_000_300.0)
     found = screening._first_that_holds(base, None, reduced, options)
     return found and found.starts[0]
+
+
+def test_an_effect_on_a_bound_begins_where_it_ended_beside_another():
+    """A caster's trail on its bound was fitted anew beside each of five others."""
+    size = Parameter("length", "m", 0.01, -0.04, 0.04)
+    trail, toe = (Effect(n, (size,), "", "", lambda spec, length: None) for n in ("trail", "toe"))
+    bound, inside, ended = (
+        Term(effect, {"length": value}, ("length",))
+        for effect, value in ((trail, -0.04), (toe, 0.01), (trail, -0.03))
+    )
+    assert screening._off_bounds((bound, inside), []) == (bound, inside)
+    before = [ended, replace(inside, values={"length": 0.02})]
+    assert screening._off_bounds((bound, inside), before) == (ended, inside)

@@ -72,7 +72,14 @@ def fits(monkeypatch):
     found = SimpleNamespace(asked=asked, answers=answers, reaches=reaches, most=1.0)
 
     def refit(
-        bench, start, before, nuisances=None, rounds=multistart.ROUNDS, part=None, reach=np.inf
+        bench,
+        start,
+        before,
+        nuisances=None,
+        rounds=multistart.ROUNDS,
+        part=None,
+        reach=np.inf,
+        nothing=np.inf,
     ):
         keys = "+".join(sorted(t.effect.key for t in start.terms))
         asked.append((keys, before))
@@ -154,7 +161,7 @@ def test_more_effects_are_to_fit_better_than_the_best_part_of_them(fits, monkeyp
     """A hypothesis without one of these effects may fit worse."""
     asked = {}
 
-    def refit(bench, start, before, nuisances, rounds, part, reach):
+    def refit(bench, start, before, nuisances, rounds, part, reach, nothing):
         asked["+".join(sorted(t.effect.key for t in start.terms))] = part and part.total
         return fit(1400.0)
 

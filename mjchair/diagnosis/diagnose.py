@@ -27,6 +27,9 @@ from mjchair.effects.effect import Effect
 from mjchair.effects.library import library
 from mjchair.model.engine_warnings import without_engine_warnings
 
+# times as common as others: who writes an effect has a reason to suspect it (assumption)
+SUSPECTED = 8.0
+
 
 def study_effects(study: Study, more: Sequence[Effect] = ()) -> list[Effect]:
     """The effects that this study could show."""
@@ -41,7 +44,8 @@ def study_effects(study: Study, more: Sequence[Effect] = ()) -> list[Effect]:
         and not (effect.commanded and study.torque_measured)
     ]
     wrong = mistaken(study.channels, study.nuisance, study.driven_as_measured)
-    return [*(_rarer(effect, wrong) for effect in possible), *more]
+    suspected = (replace(effect, common=SUSPECTED * effect.common) for effect in more)
+    return [*(_rarer(effect, wrong) for effect in possible), *suspected]
 
 
 def _rarer(effect: Effect, wrong: Mapping[str, float]) -> Effect:

@@ -254,12 +254,10 @@ def _holding(
     Args:
       made: takes what each other fit leaves, with its penalty, and the fit.
     """
-    known: dict[int, Term] = {}  # where effects ended that linear algebra puts on a bound
+    ended: list[Term] = []
     for h in options:
-        terms = [
-            known.get(id(t.effect), t) if on_bound(t) else t for t in hypotheses.terms(reduced, h)
-        ]
-        start = replace(base.around.variant, terms=tuple(terms))
+        terms = _off_bounds(hypotheses.terms(reduced, h), ended)
+        start = replace(base.around.variant, terms=terms)
         reach = rules.short_of(promised=reduced.total - h.gain, gain=h.gain)
         try:
             fitted = refit(
@@ -279,8 +277,14 @@ def _holding(
         if settled and fitted.total < reach and not pushed:
             return found
         made.append((fitted.total + h.penalty, found))
-        known |= {id(t.effect): t for t in fitted.variant.terms}
+        ended += fitted.variant.terms
     return None
+
+
+def _off_bounds(terms: Sequence[Term], ended: Sequence[Term]) -> tuple[Term, ...]:
+    """Terms; one that linear algebra puts on a bound is as it ended in the fit before."""
+    known = {id(t.effect): t for t in ended}
+    return tuple(known.get(id(t.effect), t) if on_bound(t) else t for t in terms)
 
 
 def _reduced_anew(base: Base) -> Base:
