@@ -175,11 +175,12 @@ def _line(found: Diagnosis) -> str:
     """Verdict, effects and gap on one line."""
     names = ", ".join(e.name for e in found.effects) or "no effect"
     sets = " / ".join(" or ".join(group).replace("+", " with ") for group in found.alternatives)
-    gap = found.gap
+    gap, alone = found.gap, found.verdict == "ambiguous" and not sets
     assert gap is not None
     return (
         f"{found.verdict}: {names}"
         + (f"; cannot be told apart: {sets}" if sets else "")
+        + ("; these runs are not enough to name it" if alone else "")
         + ("; more is missing" if found.more_missing else "")
         + f"; gap {gap.before:.2f}"
         + (f" -> {gap.after:.2f}" if gap.after is not None else "")

@@ -201,15 +201,18 @@ def _once(base: Base, choice: Choice, held: rules.HeldOut | None) -> bool:
 def _process(base: Base) -> dict[str, Estimate]:
     """Standard deviation of what shakes the chair, by the names of [noise.process].
 
-    Of a person, the share of the force that is in no model; only where a person moves.
+    Of a person, the share of the force that is in no model; only where a person moves. Sideways
+    only where a channel looks there.
     """
     process = base.bench.process
     if process is None:
         return {}
+    aside = any(channel.endswith(".y") for channel in base.bench.simulator.channels)
+    unseen = {"person": not process.person.any(), "side": not aside}
     return {
         name: Estimate(value=level(process.levels, name), std=None, unit=unit)
         for name, (_, unit) in NAMED.items()
-        if name != "person" or process.person.any()
+        if not unseen.get(name, False)
     }
 
 

@@ -16,6 +16,7 @@ from mjchair.diagnosis.data.windows import Window
 from mjchair.diagnosis.explain import missing_force
 from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis.fit.column_ids import RoughlyKnown
 from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.slow_part import BAND
 from mjchair.diagnosis.fit.system import System
@@ -258,7 +259,14 @@ def _rolled(
 
 
 def _moved(base: Base, fitted: Fitted | None) -> tuple[Moved, ...]:
-    variant = (base.plain if fitted is None else fitted).variant
+    """What was moved, with what stands in no corrected chair: how tires give way."""
+    here = base.plain if fitted is None else fitted
+    added = [
+        (n, float(here.step[here.system.places[RoughlyKnown(n.name)]]))
+        for n in here.variant.nuisances
+        if n.linear
+    ]
     return tuple(
-        Moved(name=n.name, std=n.std, unit=n.unit, by=by) for n, by in variant.known_roughly
+        Moved(name=n.name, std=n.std, unit=n.unit, by=by)
+        for n, by in [*here.variant.known_roughly, *added]
     )

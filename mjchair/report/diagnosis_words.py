@@ -33,6 +33,7 @@ TURNS = {"wheel_turn": str(Part.WHEEL_TURN), "caster_turn": str(Part.CASTER_TURN
 CLEAR = 0.5  # of what shakes the chair forward: a force once a turn of this size is told
 NOTABLE = 1.5  # times the noise: where a correction leaves more, what can explain it is said
 A_GAP = 0.8  # of what a correction leaves: where no more than this is a gap, the rest is explained
+FAINT = 1e-3  # of the loudest: less of what shakes a chair is nothing
 UNSURE = 0.005  # probabilities below this are not named
 
 
@@ -177,8 +178,11 @@ def process_words(diagnosis: Diagnosis) -> str:
         return ""
     names = {"drive": "forward", "side": "sideways", "yaw": "about the vertical"}
     names |= {name: when for name, (when, _) in _clear_turns(diagnosis).items()}
+    loudest = max(e.value for name, e in process.items() if name in names)
     levels = ", ".join(
-        f"{size(e.value)} {e.unit} {names[name]}" for name, e in process.items() if name in names
+        f"{size(e.value) if e.value > FAINT * loudest else 0} {e.unit} {names[name]}"
+        for name, e in process.items()
+        if name in names
     )
     return (
         "Between the gap and the noise of the sensors stands what shakes the chair and repeats in "

@@ -73,7 +73,8 @@ def check_initial(given: Mapping[str, object], name: str) -> None:
 
 
 def _refuse(trial: Trial, name: str, what: str, why: str, unit: str) -> NoReturn:
-    header = f"; give SI, or the unit in its header, as in {name} [{unit}]" if unit else ""
+    headers = " or ".join(f"{name} [{one}]" for one in unit.split(", ") if one)
+    header = f"; give SI, or the unit in its header, as in {headers}" if unit else ""
     raise MjchairError(f"{trial.name}: {name} looks like {what}: {why}{header or '; give SI'}")
 
 
@@ -95,7 +96,8 @@ def _check_limits(trial: Trial, axle: RearAxle) -> None:
         if size > limit:
             what = _other_units(name) if size <= DEGREES * limit else "other units"
             why = f"it reaches {size:.3g}, and no chair passes {limit:.3g} in SI"
-            _refuse(trial, name, what, why, kind.degrees)
+            turns = ", rpm" if what.endswith("rpm") else ""
+            _refuse(trial, name, what, why, kind.degrees + turns)
 
 
 def _other_units(name: str) -> str:

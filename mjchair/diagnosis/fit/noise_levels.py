@@ -36,6 +36,7 @@ Array = NDArray[np.float64]
 STEPS = 15
 LEAST_HZ = 1.5  # below it a chair's effects show, so a sensor's power there is that of just above
 FAR = 4.0  # ratio of a run's level (as power) to the median run's: beyond is an event, no level
+TELLS = 0.25  # of what the run tells that tells most: what tells less of a level is no usual run
 FLAT = 4.0  # power of a sensor in its slowest band over that in the next, at most
 OWN = 6.0  # numbers that tell a run's level as well as all other runs together do
 
@@ -294,7 +295,7 @@ def _of_runs(level: Array, shown: Array, due: Array) -> Array:
     power = level[there] ** 2
     ratio = _ratio(shown[there], due[there])
     told = power * due[there]  # about as many numbers tell it
-    ceiling = FAR * float(np.median(ratio * power))
+    ceiling = FAR * _usual((ratio * power)[told >= TELLS * told.max()])
     own = np.minimum(ratio * power, max(ceiling, 1e-12))
     common = float((own * told).sum() / max(told.sum(), 1e-12)) if told.sum() > 0.0 else own.mean()
     share = told / (told + OWN)
@@ -303,6 +304,14 @@ def _of_runs(level: Array, shown: Array, due: Array) -> Array:
         1.0 - share
     )
     return out
+
+
+def _usual(powers: Array) -> float:
+    """The median of the runs' powers (n,); of an even number the lower one of the middle two.
+
+    Of two runs one may hold an event, and their mean is as loud as that.
+    """
+    return float(np.sort(powers)[(powers.size - 1) // 2])
 
 
 def _ratio(shown: Array, due: Array) -> Array:
