@@ -77,7 +77,7 @@ def test_a_slope_is_found_with_its_size(slope):
 
 def test_a_slope_that_every_run_shows_is_no_event(slope):
     stages = DIAGNOSES[-1].stages
-    brings = event.largest(stages.base)
+    brings = event.largest(stages.base).gain
     assert brings > 0.0
     assert not rules.happened_once(event=brings, gain=stages.choice.hypothesis.gain)
 

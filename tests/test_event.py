@@ -18,5 +18,6 @@ def test_the_best_event_lies_in_one_run_and_in_seconds_that_follow_each_other():
     }
     brings[ForceColumn(ForceGroup(Force.FORWARD, Driver(Quantity.SPEED)), 0)] = 900.0
     reduced = SimpleNamespace(index=list, gain=lambda which: sum(brings[c] for c in which))
-    assert event.largest(SimpleNamespace(columns=brings, reduced=reduced)) == 95.0
-    assert event.largest(SimpleNamespace(columns={}, reduced=reduced)) == 0.0
+    best = event.largest(SimpleNamespace(columns=brings, reduced=reduced))
+    assert best == event.Event(gain=95.0, trial="a", second=1)
+    assert event.largest(SimpleNamespace(columns={}, reduced=reduced)).gain == 0.0

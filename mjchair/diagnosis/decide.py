@@ -110,7 +110,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         where=_where(base),
         next_experiment=_following(base, choice, said, plan, left),
         notes=[
-            *_notes(base, choice, closed, said, left),
+            *_notes(base, gap, choice, closed, said, left),
             *(_differs(d) for d in differing if named),
             *unplanned,
         ],
@@ -194,7 +194,7 @@ def _standing_keys(choice: Choice) -> set[str]:
 
 def _once(base: Base, choice: Choice, held: rules.HeldOut | None) -> bool:
     """Whether something that happened once, in one run, fits about as well as the effects do."""
-    largest = event.largest(base)
+    largest = event.largest(base).gain
     return rules.happened_once(event=largest, gain=choice.hypothesis.gain, held=held)
 
 
@@ -234,7 +234,9 @@ def _plan(base: Base, choice: Choice, once: bool) -> tuple[Plan | None, list[str
     ]
     if once:
         near.append(base.plain)
-        needed.append(rules.to_show_again(event=event.largest(base), gain=choice.hypothesis.gain))
+        needed.append(
+            rules.to_show_again(event=event.largest(base).gain, gain=choice.hypothesis.gain)
+        )
     try:
         plan = design.plan(base.bench, chosen, near, needed=needed)
     except MjchairError as error:
@@ -411,7 +413,12 @@ def _remark(fitted: Fitted, term: Term) -> str:
 
 
 def _notes(
-    base: Base, choice: Choice | None, closed: float, said: Verdict, left: list[MissingForce]
+    base: Base,
+    gap: Gap,
+    choice: Choice | None,
+    closed: float,
+    said: Verdict,
+    left: list[MissingForce],
 ) -> list[str]:
     study = base.bench.simulator.study
     notes = list(study.notes)
@@ -442,7 +449,15 @@ def _notes(
             f"nothing in the library explains the gap; the nearest, {names}, closes {closed:.0%} "
             "of it on the runs that it was fitted to"
         )
-    if any(force.goes_with.quantity == Quantity.STROKE for force in left[:TOP]):
+    once = event.largest(base)
+    most = max((t.statistic for t in gap.tests), default=0.0)
+    if rules.happened_once(event=once.gain, gain=most):
+        notes.append(
+            f"it may have happened once: a force in {once.trial} between {once.second} and "
+            f"{once.second + event.LASTS} s alone brings {min(once.gain / most, 1.0):.0%} of what "
+            "any test shows; if something touched the chair then, cut the trial there"
+        )
+    elif any(force.goes_with.quantity == Quantity.STROKE for force in left[:TOP]):
         notes.append(
             "the missing force comes back with every stroke: chair and rider are not one rigid "
             "body, and what of the rider moves, and how heavy it is, these channels do not tell"
