@@ -156,6 +156,7 @@ class MultiStart:
             return self.near.refit(self.hypothesis.starts, rounds, self.part, reach)
         terms = hypotheses.terms(base.reduced, self.hypothesis, share)
         start = replace(base.around.variant, terms=terms)
+        nothing = base.reduced.total if rounds else np.inf  # else the start itself is asked for
         return refit(
             base.bench,
             start,
@@ -164,9 +165,7 @@ class MultiStart:
             rounds,
             self.part,
             reach,
-            base.reduced.total
-            if rounds
-            else np.inf,  # without rounds the start itself is asked for
+            nothing,
         )
 
     def _terms(self) -> tuple[Term, ...]:
