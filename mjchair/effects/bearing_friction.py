@@ -5,6 +5,7 @@ Two forms, one name: what ages brakes both wheels, and what rubs on one of them 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import mujoco
@@ -25,6 +26,12 @@ def of_one_side(spec: mujoco.MjSpec, left: float, right: float) -> None:
     """Add `left` and `right` (N m) to the friction of the rear wheels' joints."""
     for wheel, coulomb in zip(parts.REAR, (left, right), strict=True):
         parts.named(spec.joints, wheel, "joint").frictionloss += coulomb
+
+
+def _of_one_side(values: Mapping[str, float], std: Mapping[str, float]) -> str:
+    sides = [side for side, torque in values.items() if torque]
+    wheel = f"the {sides[0]} rear wheel" if len(sides) == 1 else "each rear wheel"
+    return f"of {wheel} by itself, as where something rubs on it"
 
 
 EFFECT = Effect(
@@ -48,4 +55,5 @@ ONE_SIDED = replace(
     source="sizes assumed: a brake shoe that touches the tire is 0.3-3 N m",
     edit=of_one_side,
     drive=False,
+    remark=_of_one_side,
 )

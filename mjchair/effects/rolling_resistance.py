@@ -5,6 +5,7 @@ Two forms, one name: a floor brakes every wheel in proportion to its load, and a
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import mujoco
@@ -27,6 +28,12 @@ def of_one_side(spec: mujoco.MjSpec, left: float, right: float) -> None:
         parts.add_to_tires(spec, block.ROLLING_RESISTANCE, added, (wheel,))
 
 
+def _of_one_side(values: Mapping[str, float], std: Mapping[str, float]) -> str:
+    sides = [side for side, added in values.items() if added]
+    wheel = f"the {sides[0]} rear wheel" if len(sides) == 1 else "each rear wheel"
+    return f"of {wheel} by itself, as a soft tire rolls"
+
+
 EFFECT = Effect(
     name="rolling_resistance",
     parameters=(Parameter("coefficient", "1", 0.005, LEAST, MOST),),
@@ -46,4 +53,5 @@ ONE_SIDED = replace(
     source="a tire at a quarter of its pressure rolls about twice as hard; assumed",
     edit=of_one_side,
     drive=False,
+    remark=_of_one_side,
 )
