@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import mjchair
-from mjchair.effects import bearing_friction, payload, rolling_resistance
+from mjchair.effects import bearing_friction, rolling_resistance
 from mjchair.effects.library import MECHANICAL, find, library, names
 from mjchair.errors import MjchairError
 
@@ -151,29 +151,6 @@ def test_a_drag_on_one_side_turns_the_chair_there_and_mirrored_to_the_other(form
     assert abs(turns["both"]) < 1e-3 * turns["left"]
     of_one, of_both = (losses[n] - losses["none"] for n in ("left", "both"))
     assert of_one == pytest.approx(0.5 * of_both, rel=0.05)
-
-
-def test_a_bag_behind_weighs_and_shifts_as_a_mass_there_does():
-    bare = mjchair.load_spec().compile()
-    spec = mjchair.load_spec()
-    payload.ALONG.apply(spec, {"mass": 10.0, "height": 0.9, "ahead": -0.3})
-    loaded = spec.compile()
-    at, there = bare.body("chair"), loaded.body("chair")
-    assert there.mass[0] - at.mass[0] == pytest.approx(10.0)
-    moved = there.mass[0] * there.ipos - at.mass[0] * at.ipos
-    np.testing.assert_allclose(moved, 10.0 * np.array([at.ipos[0] - 0.3, at.ipos[1], 0.9]))
-
-
-@pytest.mark.parametrize("form", [payload.EFFECT, payload.ALONG], ids=["over", "along"])
-def test_a_fit_of_a_load_begins_with_the_mass_and_the_moments_of_what_was_weighed(form):
-    (start,) = form.starts()
-    shares = np.array([0.5, 0.2, 0.4])[: len(start.points)]
-    found = start.combine(shares)
-    masses = [c * p["mass"] for c, p in zip(shares, start.points, strict=True)]
-    assert found["mass"] == pytest.approx(sum(masses))
-    for name in set(found) - {"mass"}:
-        moment = sum(m * p[name] for m, p in zip(masses, start.points, strict=True))
-        assert found["mass"] * found[name] == pytest.approx(moment)
 
 
 def test_drag_is_the_same_in_plain_python_and_against_the_air():

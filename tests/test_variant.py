@@ -121,7 +121,6 @@ def descent(monkeypatch):
     monkeypatch.setattr(nonlinear, "_around", lambda _, here, *__: here)
     monkeypatch.setattr(nonlinear, "_after_linear_step", lambda *_: None)
     monkeypatch.setattr(nonlinear, "_between", lambda *_: None)
-    monkeypatch.setattr(nonlinear, "_least", lambda *_: None)
     monkeypatch.setattr(nonlinear, "_nearer", lambda _, here, *__: here)
 
 

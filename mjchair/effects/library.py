@@ -55,7 +55,6 @@ MECHANICAL = (
     camber.EFFECT,
     mass_offset.EFFECT,
     payload.EFFECT,
-    payload.ALONG,
     wheel_radius.EFFECT,
     wheel_radius.TWISTING,
     cornering_stiffness.EFFECT,

@@ -119,7 +119,7 @@ def refit(
     here = _placed(bench, start, before, nuisances)
     most = ASTRAY * nothing if part is None else part.total
     if here.total > most:
-        here = _nearer(bench, here, _least(here.variant, part), most, before, nuisances)
+        here = _nearer(bench, here, part, most, before, nuisances)
     best = _around(bench, here, nuisances)
     variant = _after_linear_step(bench, best)
     share, fails = 1.0, 0  # of the linear step, that is tried
@@ -164,7 +164,7 @@ def _least(variant: Variant, part: Fitted | None) -> Variant:
 def _nearer(
     bench: Bench,
     here: Placed,
-    least: Variant,
+    part: Fitted | None,
     most: float,
     before: Track | None,
     nuisances: dict[ColumnId, Column],
@@ -174,10 +174,11 @@ def _nearer(
     The size that linear algebra promises of an effect may be absurd: a tire without friction.
 
     Args:
-      least: with less of the effects. most: its chi2.
+      part: less of the effects, which fits better; None: none of them, and whether that fits better
+        around this start is not known, so one place is tried. most: chi2 that is good enough.
     """
-    far = here.variant
-    for share in NEARER:
+    least, far = _least(here.variant, part), here.variant
+    for share in NEARER if part is not None else NEARER[:1]:
         try:
             there = _placed(bench, _between(least, far, share), before, nuisances)
         except (MjchairError, np.linalg.LinAlgError):  # of what no chair can be
