@@ -120,18 +120,15 @@ def only_writer(folder: Path) -> Iterator[None]:
       MjchairError: another process writes into it.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    lock = FileLock(folder / "lock", timeout=0)
     try:
-        lock.acquire()
+        lock = FileLock(folder / "lock", timeout=0).acquire()
     except Timeout:
         raise MjchairError(
             f"another mjchair writes into {folder.parent}; wait until it ends, or choose another "
             "--out"
         ) from None
-    try:
+    with lock:
         yield
-    finally:
-        lock.release()
 
 
 def read_bounded(path: Path, largest: int, kind: str, reason: str) -> bytes:

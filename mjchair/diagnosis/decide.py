@@ -259,13 +259,11 @@ def _following(
         if lone is not None:
             return wording.letting_in(*lone)
         return wording.searching([(force.goes_with, force.sigmas) for force in left])
-    if said == Verdict.AMBIGUOUS and choice is not None:
-        known = choice.fitted.variant.known_roughly
-        return wording.measuring([(n, by) for n, by in known if rules.is_far(by)])
-    if said == Verdict.NONE:
-        known = base.plain.variant.known_roughly
-        return wording.measuring([(n, by) for n, by in known if rules.is_far(by)])
-    return ""
+    if said == Verdict.NAMED:
+        return ""
+    answered = choice if said == Verdict.AMBIGUOUS else None
+    known = (answered.fitted if answered else base.plain).variant.known_roughly
+    return wording.measuring([(n, by) for n, by in known if rules.is_far(by)])
 
 
 def _alternatives(choice: Choice, once: bool) -> list[list[str]]:

@@ -11,6 +11,7 @@ from dataclasses import replace
 import mujoco
 
 from mjchair.effects.effect import Effect, Parameter
+from mjchair.effects.one_wheel import wheel_words
 from mjchair.model import parts
 
 
@@ -29,9 +30,7 @@ def of_one_side(spec: mujoco.MjSpec, left: float, right: float) -> None:
 
 
 def _of_one_side(values: Mapping[str, float], std: Mapping[str, float]) -> str:
-    sides = [side for side, torque in values.items() if torque]
-    wheel = f"the {sides[0]} rear wheel" if len(sides) == 1 else "each rear wheel"
-    return f"of {wheel} by itself, as where something rubs on it"
+    return f"of {wheel_words(values)}, as where something rubs on it"
 
 
 EFFECT = Effect(

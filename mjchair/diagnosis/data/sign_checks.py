@@ -43,14 +43,13 @@ def check(trial: Trial, axle: RearAxle, mass: float) -> list[str]:
     stories = turning(trial, axle)
     for one, two in combinations(stories, 2):
         _check_pair(trial, (one, two), (stories[one], stories[two]))
-    if "wheels" in stories:
-        wheels = stories.pop("wheels")
-        for name, story in stories.items():
-            _check_spin(trial, axle, (name, story), wheels)
+    for name, story in stories.items():
+        if "wheels" in stories and name != "wheels":
+            _check_spin(trial, axle, (name, story), stories["wheels"])
     if trial.inputs is None:
         return _undriven(trial, axle)
-    _check_moment(trial, trial.inputs, turning(trial, axle))
-    return _torque(trial, axle, mass)
+    _check_moment(trial, trial.inputs, stories)
+    return _torque(trial, trial.inputs, axle, mass)
 
 
 def _check_pair(trial: Trial, names: tuple[str, str], stories: tuple[Story, Story]) -> None:
@@ -102,9 +101,9 @@ def _check_moment(trial: Trial, inputs: Inputs, turns: dict[str, Story]) -> None
     """
     if not {f"{side}_wheel" for side in SIDES} <= set(inputs.controls):
         return
-    against = [name for name, story in turns.items() if _turns_against(inputs, story)]
-    for_it = [name for name, story in turns.items() if _turns_with(inputs, story)]
-    if against and not for_it:
+    shares = {name: _moment_shares(inputs, story) for name, story in turns.items()}
+    against = [name for name, share in shares.items() if (share < 0.0).all()]
+    if against and not any((share > 0.0).any() for share in shares.values()):
         raise MjchairError(
             f"{trial.name}: the torques turn the chair right where {against[0]} turns left; are "
             "the columns left_wheel and right_wheel swapped, or of the other sign?"
@@ -129,14 +128,6 @@ def _moment_shares(inputs: Inputs, story: Story) -> Array:
     return np.asarray(shares if told else np.zeros(2))
 
 
-def _turns_against(inputs: Inputs, story: Story) -> bool:
-    return bool((_moment_shares(inputs, story) < 0.0).all())
-
-
-def _turns_with(inputs: Inputs, story: Story) -> bool:
-    return bool((_moment_shares(inputs, story) > 0.0).any())
-
-
 def _undriven(trial: Trial, axle: RearAxle) -> list[str]:
     """A note where a chair gains speed that nothing gives it."""
     for name, story in forward(trial, axle).items():
@@ -153,18 +144,16 @@ def _undriven(trial: Trial, axle: RearAxle) -> list[str]:
     return []
 
 
-def _torque(trial: Trial, axle: RearAxle, mass: float) -> list[str]:
+def _torque(trial: Trial, inputs: Inputs, axle: RearAxle, mass: float) -> list[str]:
     """A note where torques take energy from a chair that it did not have."""
-    if trial.inputs is None:
-        return []
     work, speeds = 0.0, []
     for side in SIDES:
         name = f"{side}_wheel_speed"
         if name not in trial.channels:
             return []
         time, speed = trial.samples(name)
-        if f"{side}_wheel" in trial.inputs.controls:
-            power = trial.inputs.at(f"{side}_wheel", time) * speed
+        if f"{side}_wheel" in inputs.controls:
+            power = inputs.at(f"{side}_wheel", time) * speed
             work += float(np.trapezoid(power, time))
         speeds.append(axle.radius(side) * speed)
     lost = sum(0.25 * mass * (v[:10].mean() ** 2 - v[-10:].mean() ** 2) for v in speeds)

@@ -72,9 +72,9 @@ def check_initial(given: Mapping[str, object], name: str) -> None:
         )
 
 
-def _refuse(trial: Trial, name: str, what: str, why: str, unit: str) -> NoReturn:
-    headers = " or ".join(f"{name} [{one}]" for one in unit.split(", ") if one)
-    header = f"; give SI, or the unit in its header, as in {headers}" if unit else ""
+def _refuse(trial: Trial, name: str, what: str, why: str, *units: str) -> NoReturn:
+    headers = " or ".join(f"{name} [{unit}]" for unit in units)
+    header = f"; give SI, or the unit in its header, as in {headers}" if units else ""
     raise MjchairError(f"{trial.name}: {name} looks like {what}: {why}{header or '; give SI'}")
 
 
@@ -94,18 +94,19 @@ def _check_limits(trial: Trial, axle: RearAxle) -> None:
             continue
         limit, size = limit_of(name, kind.most, axle), _size(values)
         if size > limit:
-            what = _other_units(name) if size <= DEGREES * limit else "other units"
             why = f"it reaches {size:.3g}, and no chair passes {limit:.3g} in SI"
-            turns = ", rpm" if what.endswith("rpm") else ""
-            _refuse(trial, name, what, why, kind.degrees + turns)
+            units = [kind.degrees] if kind.degrees else []
+            if not units or size > DEGREES * limit:
+                _refuse(trial, name, "other units", why, *units)
+            if rolls(name) and kind.unit == "rad/s":
+                _refuse(trial, name, "deg/s or rpm", why, *units, "rpm")
+            _refuse(trial, name, "degrees", why, *units)
 
 
-def _other_units(name: str) -> str:
-    """The units in place of SI that people use of a channel."""
-    kind = sensor(name)
-    if not kind.degrees:
-        return "other units"
-    return "deg/s or rpm" if rolls(name) and kind.unit == "rad/s" else "degrees"
+def _fastest(trial: Trial, name: str) -> float:
+    """How fast an angle or a place changes, but for single samples; 0 where that is not told."""
+    story = _rate(trial, name)
+    return _size(story.values) if story.values.size else 0.0
 
 
 def _check_rates(trial: Trial, axle: RearAxle) -> None:
@@ -113,8 +114,7 @@ def _check_rates(trial: Trial, axle: RearAxle) -> None:
         kind = sensor(name)
         if kind.fastest is None or kind.unit == "m":
             continue
-        limit, story = limit_of(name, kind.fastest, axle), _rate(trial, name)
-        fastest = _size(story.values) if story.values.size else 0.0
+        limit, fastest = limit_of(name, kind.fastest, axle), _fastest(trial, name)
         if fastest > limit:
             why = f"it turns by {fastest:.3g} a second, and no chair passes {limit:.3g} rad/s"
             _refuse(trial, name, "degrees", why, "deg")
@@ -134,9 +134,10 @@ def _check_torque(trial: Trial) -> None:
 
 def _check_gravity(trial: Trial) -> None:
     for name in ("imu_accelerometer.x", "imu_accelerometer.y"):
-        if name in trial.channels and abs(np.nanmedian(trial.channels[name])) > 0.5 * GRAVITY:
+        middle = float(np.nanmedian(trial.channels.get(name, np.zeros(1))))
+        if abs(middle) > 0.5 * GRAVITY:
             raise MjchairError(
-                f"{trial.name}: {name} stays near {np.nanmedian(trial.channels[name]):.2f}, as the "
+                f"{trial.name}: {name} stays near {middle:.2f}, as the "
                 "axis does that points up; x is forward, y left and z up: name the axes so"
             )
     name = "imu_accelerometer.z"
@@ -261,8 +262,7 @@ def _check_places(trial: Trial) -> None:
         kind = sensor(name)
         if kind.unit != "m" or kind.fastest is None:
             continue
-        story = _rate(trial, name)
-        fastest = _size(story.values) if story.values.size else 0.0
+        fastest = _fastest(trial, name)
         if fastest > kind.fastest:
             why = f"it moves by {fastest:.3g} a second, and no chair passes {kind.fastest:g} m/s"
             _refuse(trial, name, "mm or cm", why, "mm")

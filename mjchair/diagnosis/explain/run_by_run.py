@@ -80,18 +80,18 @@ def _freed(
     """Chi2 gained by sizes of their own in every run, how many these free, and the sizes."""
     runs = sorted({int(system.run[i]) for i in bench.windows})
     of_run = [[i for i in bench.windows if system.run[i] == run] for run in runs]
-    G, b = system.G[bench.windows].sum(axis=0), system.b[bench.windows].sum(axis=0)
-    p, places = len(b), [system.places[key] for key, _ in sized]
-    own = [(k, windows) for k in places for windows in of_run]
-    whole, aim = np.zeros((p + len(own),) * 2), np.r_[b, np.zeros(len(own))]
-    whole[:p, :p] = G
-    for j, (k, windows) in enumerate(own):
-        alone = system.G[windows].sum(axis=0)
-        whole[:p, p + j] = whole[p + j, :p] = alone[:, k]
-        aim[p + j] = system.b[windows].sum(axis=0)[k]
+    G = [system.G[windows].sum(axis=0) for windows in of_run]
+    b = [system.b[windows].sum(axis=0) for windows in of_run]
+    p, places = len(b[0]), [system.places[key] for key, _ in sized]
+    own = [(k, r) for k in places for r in range(len(runs))]
+    whole = np.zeros((p + len(own),) * 2)
+    whole[:p, :p] = sum(G)
+    aim = np.r_[sum(b), [b[r][k] for k, r in own]]
+    for j, (k, r) in enumerate(own):
+        whole[:p, p + j] = whole[p + j, :p] = G[r][:, k]
         for other, (m, theirs) in enumerate(own):
-            if theirs is windows:
-                whole[p + j, p + other] = alone[k, m]
+            if theirs == r:
+                whole[p + j, p + other] = G[r][k, m]
     known = system.nuisance - system.free
     precision = np.r_[np.ones(known), np.full(p - known, 1e-9), np.full(len(own), LOOSE**-2)]
     aim[: system.nuisance] -= precision[: system.nuisance] * system.back

@@ -116,10 +116,6 @@ class Rehearsal:
             made = [made[i] for i in whole]
         # cut as they will be once they are measured: without what a chair does as it comes to rest
         self._plan(bench, setting, [o.predicted for o in made])
-        self.simulator.turned = [
-            {i: o.predicted[:, i] for i in turned}
-            for o, turned in zip(made, self.simulator.turned, strict=True)
-        ]
         self.whitener = Whitener(self.simulator, bench.noise)
         self.track = self._track(chair, [o.trace for o in made])
         self.process = None if bench.process is None else self._shaken(bench, bench.process)
