@@ -183,6 +183,16 @@ def diagnosis(verdict=Verdict.NAMED, **options):
     )
 
 
+def test_no_share_of_a_gap_is_shown_where_there_is_none():
+    found = diagnosis(Verdict.NONE)
+    without = [dataclasses.replace(c, closure=0.0) for c in found.candidates]
+    none = dataclasses.replace(found, candidates=without)
+    assert ">closes<" in page(diagnosis(Verdict.UNKNOWN), {})
+    assert ">closes<" not in page(none, {}) and "|cos|" not in page(none, {})
+    assert ">|cos|<" in page(diagnosis(), {})
+    assert "closes" not in str(candidates.figure(none).axes[-1].get_xlabel())
+
+
 def test_a_named_effect_comes_with_value_and_uncertainty():
     said = words.missing(Diagnosis(verdict=Verdict.NAMED, effects=[ROLLING]))
     assert said == "The chair lacks **rolling resistance** (coefficient 0.01460 ± 0.00040)."

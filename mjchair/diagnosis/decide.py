@@ -325,7 +325,8 @@ def _named(fitted: Fitted, closed: float) -> list[NamedEffect]:
 def _candidates(base: Base, gap: Gap, choice: Choice | None) -> list[Candidate]:
     """Every effect alone, as it was screened."""
     out = []
-    total = gain(base, choice.fitted) if choice else max(gap.excess, 1.0)
+    excess = max(gap.excess, 1.0) if gap.exists else math.inf  # nothing closes what is not there
+    total = gain(base, choice.fitted) if choice else excess
     for h in hypotheses.singles(base.reduced, base.starts):
         columns = base.system.index(h.columns)
         gained = held_out(base.bench, (base.system, []), (base.system, columns))

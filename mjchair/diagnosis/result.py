@@ -85,8 +85,10 @@ class Candidate:
 
     Attributes:
       held_out_gain: chi2 that it brings on each run when it is fitted to the others.
-      closure: its gain over that of the chosen effects. detectability: sigmas. p_value: of a gain
-        this large without the effect. collinear: |cos| to the chosen effects, 0 to 1.
+      closure: its gain over that of the chosen effects, or over the gap where none is chosen; 0
+        without a gap. detectability: sigmas.
+      p_value: of a gain this large without the effect.
+      collinear: |cos| to the chosen effects, 0 to 1.
     """
 
     name: str

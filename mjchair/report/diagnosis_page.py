@@ -213,12 +213,17 @@ def _candidates(diagnosis: Diagnosis) -> Table:
         Head("what it looks like"),
         Head("size (sigma)", True),
         Head("gain left out (chi²)", True),
-        Head("closes", True),
-        Head("|cos|", True),
     ]
+    leading = candidates.leading(diagnosis, CANDIDATES)
+    lines = [_candidate(c) for c in leading]
+    if any(c.closure for c in leading):
+        heads.append(Head("closes", True))
+        lines = [[*cells, f"{c.closure:.0%}"] for cells, c in zip(lines, leading, strict=True)]
+    if chosen:
+        heads.append(Head("|cos|", True))
+        lines = [[*cells, f"{c.collinear:.2f}"] for cells, c in zip(lines, leading, strict=True)]
     rows = [
-        Row(_candidate(c), (c.name, c.channel) in chosen)
-        for c in candidates.leading(diagnosis, CANDIDATES)
+        Row(cells, (c.name, c.channel) in chosen) for cells, c in zip(lines, leading, strict=True)
     ]
     return Table(heads, rows)
 
@@ -230,8 +235,6 @@ def _candidate(c: Candidate) -> list[str]:
         _signature(c),
         f"{c.detectability:.1f}",
         f"{c.held_out_gain:,.0f}",
-        f"{c.closure:.0%}",
-        f"{c.collinear:.2f}",
     ]
 
 

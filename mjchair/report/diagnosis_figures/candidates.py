@@ -1,6 +1,7 @@
 """What every effect of the library, alone, could do.
 
-In: a diagnosis. Out: bars of size, of gain on runs left out and of likeness to what was chosen.
+In: a diagnosis. Out: bars of size, of gain on runs left out and of likeness to what was chosen;
+where nothing was chosen, of the share of the gap that each closes, if there is a gap.
 """
 
 from __future__ import annotations
@@ -33,15 +34,14 @@ def figure(diagnosis: Diagnosis) -> Figure | None:
     names = [c.name.replace("_", " ") + (f" ({c.channel})" if c.channel else "") for c in top]
     colours = [AFTER if (c.name, c.channel) in chosen else FAINT for c in top]
     drawn = Figure(figsize=(9.4, 0.28 * max(len(top), 3) + 1.0), layout="constrained")
-    axes = drawn.subplots(1, 3, sharey=True)
     columns = [
         ("size in these data (sigma)", [c.detectability for c in top]),
         ("gain on runs left out (chi²)", _cut([c.held_out_gain for c in top])),
     ]
-    if any(c.collinear > 0.0 for c in top):
-        columns.append(("likeness to the chosen, |cos|", [c.collinear for c in top]))
-    else:
-        columns.append(("share of the gap that it closes", [c.closure for c in top]))
+    shares = [("likeness to the chosen, |cos|", [c.collinear for c in top])]
+    shares.append(("share of the gap that it closes", [c.closure for c in top]))
+    columns += [share for share in shares if any(share[1])][:1]
+    axes = drawn.subplots(1, len(columns), sharey=True)
     for ax, (label, values) in zip(axes, columns, strict=True):
         ax.barh(names, values, color=colours)
         ax.set_xlabel(label, fontsize=9)
@@ -49,8 +49,9 @@ def figure(diagnosis: Diagnosis) -> Figure | None:
         ax.xaxis.set_major_locator(MaxNLocator(4))
         ax.xaxis.set_major_formatter(EngFormatter(sep=""))
     axes[0].tick_params(axis="y", labelsize=8.5)
-    axes[2].set_xlim(0.0, 1.0)
-    axes[2].xaxis.set_major_formatter("{x:g}")
+    for ax in axes[2:]:
+        ax.set_xlim(0.0, 1.0)
+        ax.xaxis.set_major_formatter("{x:g}")
     return drawn
 
 
