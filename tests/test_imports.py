@@ -39,14 +39,18 @@ assert environment.render().std() > 5.0
 """
 
 
-def run(code: str) -> None:
-    """Run code in a Python of its own, without what this one has set for graphics."""
+def run(code: str, quiet: bool = False) -> None:
+    """Run code in a Python of its own, without what this one has set for graphics.
+
+    Args:
+      quiet: whether it may write nothing to standard error.
+    """
     ours = ("MUJOCO_GL", "PYOPENGL_PLATFORM", "PYGAME_HIDE_SUPPORT_PROMPT")
     environment = {name: value for name, value in os.environ.items() if name not in ours}
     done = subprocess.run(
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True
     )
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 0 and not (quiet and done.stderr), done.stderr
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the loaded libraries of a Linux process")
@@ -69,4 +73,30 @@ def test_pictures_where_the_tasks_were_imported_first():
         "from mjchair import tasks" + rest + PICTURE + "from dm_control import suite\n"
         "physics = suite.load('pendulum', 'swingup').physics\n"
         "assert physics.render(height=24, width=32).std() > 5.0"
+    )
+
+
+@drawn
+def test_a_film_and_a_task_draw_in_turn():
+    """Each draws what it draws alone, whichever drew before, and nothing is wrong at the end."""
+    run(
+        """
+import numpy as np
+import mjchair
+from mjchair import tasks
+from mjchair.report.film import Film
+
+run = mjchair.simulate(mjchair.load_spec("manual"), mjchair.constant({}, 0.1))
+physics = tasks.load("straight_line", {"random": 0}).physics
+with Film(run, width=160, height=120) as film:
+    frames = [film.frame(0)]
+picture = physics.render(84, 84, camera_id="follow")
+with Film(run, width=160, height=120) as film:
+    for _ in range(2):
+        frames.append(film.frame(0))
+        assert np.array_equal(physics.render(84, 84, camera_id="follow"), picture)
+assert np.array_equal(physics.render(84, 84, camera_id="follow"), picture)
+assert picture.std() > 5.0 and all(np.array_equal(frame, frames[0]) for frame in frames)
+""",
+        quiet=True,
     )

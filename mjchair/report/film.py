@@ -96,6 +96,7 @@ class Film:
 
     def __exit__(self, *_: object) -> None:
         """Free the OpenGL context."""
+        self._context.make_current()
         self._drawing.free()
         self._context.free()
 
@@ -124,6 +125,7 @@ class Film:
         if wheels:
             self._draw_bar(wheels[0])
         pixels = np.empty((self._rect.height, self._rect.width, 3), np.uint8)
+        self._context.make_current()  # a task may have drawn since
         mujoco.mjr_render(self._rect, self._scene, self._drawing)
         mujoco.mjr_readPixels(pixels, None, self._rect, self._drawing)
         return self._write(pixels[::-1], sample, [arrow for arrow in arrows if arrow.cut])

@@ -67,6 +67,7 @@ class MarkerFilm:
 
     def __exit__(self, *_: object) -> None:
         """Give the context back."""
+        self._context.make_current()
         self._drawing.free()
         self._context.free()
 
@@ -82,6 +83,7 @@ class MarkerFilm:
             if np.isfinite(place[0]):
                 self._ball(self._base + self._axes @ place)
         pixels = np.empty((self._rect.height, self._rect.width, 3), np.uint8)
+        self._context.make_current()  # a task may have drawn since
         mujoco.mjr_render(self._rect, self._scene, self._drawing)
         mujoco.mjr_readPixels(pixels, None, self._rect, self._drawing)
         return np.flipud(pixels)
