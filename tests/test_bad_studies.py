@@ -8,6 +8,7 @@ import pytest
 from mjchair import cli
 
 TIME = np.round(np.arange(0.0, 4.0, 0.02), 6)
+SIDES = ("left", "right")
 EMPTY = np.full(TIME.size, np.nan)
 HEAD = 'model = "manual"\n'
 PUSH = 1.0 + np.sin(2.0 * np.pi * TIME)  # m/s, with strokes
@@ -246,6 +247,25 @@ CASES = {
     "no noise at all": (
         {"columns": coast(), "head": HEAD + '[noise]\n"left_wheel_speed" = 0\n'},
         "noise of left_wheel_speed is 0; it must be positive",
+    ),
+    "noise of no channel": (
+        {"columns": coast(), "head": HEAD + "[noise]\nleft_wheel_sped = 0.1\n"},
+        "'left_wheel_sped', which is no channel; did you mean 'left_wheel_speed'",
+    ),
+    "a nuisance in percent": (
+        {"columns": coast(), "head": HEAD + "[nuisance]\nmass = 30\n"},
+        "mass is 30; it is a standard deviation as a share",
+    ),
+    "a first speed that is not seen": (
+        {"columns": coast(), "trial": "[trial.initial]\nspeed = 36\n"},
+        "its initial speed is 36 m/s, and by left_wheel_speed it starts at 0.8",
+    ),
+    "torques of the other sign": (
+        {
+            "columns": {f"{s}_wheel_speed": PUSH / 0.3 for s in SIDES}
+            | {f"{s}_wheel": -8.0 - PULL for s in SIDES}
+        },
+        "left_wheel and right_wheel brake whenever the chair gains speed there",
     ),
     "an unknown nuisance": (
         {"columns": coast(), "head": HEAD + "[nuisance]\nmas = 0.1\n"},

@@ -5,7 +5,7 @@ import pytest
 
 import mjchair
 from mjchair.diagnosis.data import first_state, standstill
-from mjchair.diagnosis.data.study import Run
+from mjchair.diagnosis.data.study import Run, with_copied_wheels
 from mjchair.diagnosis.data.windows import calm, cut
 from mjchair.diagnosis.driven_run import drive_run
 from mjchair.diagnosis.replay import noise
@@ -159,6 +159,34 @@ def test_a_dead_channel_is_left_out_and_said(tmp_path):
     study = mjchair.read_study(write(tmp_path, columns))
     assert "imu_gyro.z" not in study.channels
     assert any("imu_gyro.z is exactly zero" in note for note in study.notes)
+
+
+def test_a_wheel_stuck_at_one_speed_is_said(tmp_path):
+    columns = wheels() | {"left_wheel_speed": np.full(TIME.size, 3.0)}
+    study = mjchair.read_study(write(tmp_path, columns))
+    assert sum("left_wheel_speed is exactly 3 throughout" in note for note in study.notes) == 1
+
+
+@pytest.mark.parametrize("clipped", [True, False])
+def test_a_torque_at_its_sensors_end_is_said(clipped, tmp_path):
+    torque = 5.0 + 5.0 * np.sin(5.0 * TIME)
+    torque = np.minimum(torque, 8.0) if clipped else torque
+    columns = wheels() | {"left_wheel": torque, "right_wheel": torque[::-1]}
+    head = 'model = "manual"\ntorque = "measured"\n'
+    study = mjchair.read_study(write(tmp_path, columns, head=head))
+    ends = [n for n in study.notes if "exactly 8, its largest value" in n]
+    assert len(ends) == (2 if clipped else 0), study.notes
+
+
+@pytest.mark.parametrize(("share", "copied"), [(1.0, True), (0.95, True), (0.6, False)])
+def test_a_wheel_is_assumed_alike_where_its_torque_is(share, copied, tmp_path):
+    torque = 3.0 + np.sin(5.0 * TIME)
+    columns = {"left_wheel_speed": wheels()["left_wheel_speed"]}
+    columns |= {"left_wheel": torque, "right_wheel": share * torque}
+    study = mjchair.read_study(write(tmp_path, columns))
+    assert (len(with_copied_wheels(study).channels) == 2) == copied
+    said = "assumed alike" if copied else "driven unlike it, so it is simulated"
+    assert any("only the left wheel was measured" in n and said in n for n in study.notes)
 
 
 def test_an_angle_that_starts_again_once_a_turn_is_counted_on_and_said(tmp_path):

@@ -139,7 +139,7 @@ def nuisances(
       driven_as_measured: whether torques of the rear wheels come from sensors.
 
     Raises:
-      MjchairError: a name that is not a nuisance.
+      MjchairError: a name that is not a nuisance, or a share of more than the whole.
     """
     every = _usual(channels, given, driven_as_measured)
     vectors, kinds = ("imu_gyro", "imu_accelerometer"), ("bias", "scale", "drift")
@@ -147,6 +147,12 @@ def nuisances(
     for name in given:
         if name not in known:
             raise MjchairError(f"unknown nuisance {name!r}" + nearest(name, known))
+    for n in every:
+        if n.unit == "1" and _given(n, given) > max(1.0, n.std):
+            raise MjchairError(
+                f"[nuisance] {n.name} is {_given(n, given):g}; it is a standard deviation as a "
+                f"share, at most 1; {n.std:g} is usual"
+            )
     return tuple(replace(n, std=_given(n, given)) for n in every)
 
 

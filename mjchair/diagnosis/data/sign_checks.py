@@ -27,6 +27,7 @@ UNSEEN = 0.2  # of that turn, which another channel sees at most where a wheel's
 SWAPPED = 0.8  # cosine of a turning moment with what turns the chair, beyond which it is believed
 PUSHED = 0.3  # m/s, that a chair gains at PULLED or more only if something drives it, or downhill
 PULLED = 0.3  # m/s^2, as a slope of 3 %
+TOLD = 0.3  # of a torque, in rms, that must go with speed and its gain (0.34 of one in strokes)
 WORK = 40.0  # J that torques take from a chair, more than it lost: a sign may be wrong (assumption)
 SIDES = ("left", "right")
 
@@ -145,21 +146,47 @@ def _undriven(trial: Trial, axle: RearAxle) -> list[str]:
 
 
 def _torque(trial: Trial, inputs: Inputs, axle: RearAxle, mass: float) -> list[str]:
-    """A note where torques take energy from a chair that it did not have."""
-    work, speeds = 0.0, []
+    """A note where torques take energy from a chair that it did not have.
+
+    Raises:
+      MjchairError: it gains speed besides while they brake, which no slope explains.
+    """
+    taken = lost = 0.0
+    seen, against = forward(trial, axle), []
     for side in SIDES:
-        name = f"{side}_wheel_speed"
-        if name not in trial.channels:
-            return []
-        time, speed = trial.samples(name)
-        if f"{side}_wheel" in inputs.controls:
-            power = inputs.at(f"{side}_wheel", time) * speed
-            work += float(np.trapezoid(power, time))
-        speeds.append(axle.radius(side) * speed)
-    lost = sum(0.25 * mass * (v[:10].mean() ** 2 - v[-10:].mean() ** 2) for v in speeds)
-    if -work < WORK + max(lost, 0.0):
+        speeds = (seen.get(f"{side}_wheel_{kind}") for kind in ("speed", "angle"))
+        story = next((s for s in speeds if s is not None and s.time.size >= 8), None)
+        if story is None or f"{side}_wheel" not in inputs.controls:
+            continue
+        torque = at(Story(*averaged(*inputs.samples(f"{side}_wheel")), ""), story.time)
+        speed = story.values
+        takes = -float(np.trapezoid(torque * speed, story.time)) / axle.radius(side)
+        had = 0.25 * mass * float(speed[:3].mean() ** 2 - speed[-3:].mean() ** 2)
+        if takes > 0.5 * WORK + max(had, 0.0) and _brakes_as_it_gains(story, torque):
+            against.append(f"{side}_wheel")
+        taken, lost = taken + takes, lost + had
+    if against:
+        names, one = " and ".join(against), len(against) == 1
+        raise MjchairError(
+            f"{trial.name}: {names} {'brakes' if one else 'brake'} whenever the chair gains speed "
+            f"there, and {'takes' if one else 'take'} {taken:.0f} J in all: positive torque drives "
+            f"forward; turn the sign of {'its' if one else 'their'} torque, or of the wheel"
+        )
+    if taken < WORK + max(lost, 0.0):
         return []
     return [
-        f"{trial.name}: its torques take {-work:.0f} J from the chair, which had {lost:.0f} J to "
+        f"{trial.name}: its torques take {taken:.0f} J from the chair, which had {lost:.0f} J to "
         "lose: positive torque drives forward; turn their signs, unless the way goes downhill"
     ]
+
+
+def _brakes_as_it_gains(story: Story, torque: Array) -> bool:
+    """Whether a torque is the less the more speed its wheel gains; some of it goes with the speed.
+
+    On a slope as well a chair gains less the more it is braked.
+    """
+    gained = np.gradient(story.values, story.time)
+    causes = np.column_stack([gained, story.values, np.ones(gained.size)])
+    shares = np.linalg.lstsq(causes, torque, rcond=None)[0]
+    told, whole = (np.linalg.norm(t - torque.mean()) for t in (causes @ shares, torque))
+    return bool(shares[0] < 0.0 and told > TOLD * whole)

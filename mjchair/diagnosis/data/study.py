@@ -133,6 +133,8 @@ def make_study(
     for run in runs:
         check_columns(run.trial, model)
         trial, noticed = _checked(run.trial, axle, mass)
+        if "speed" in run.given:
+            unit_checks.check_first_speed(trial, axle, run.initial.speed)
         checked.append(replace(run, trial=trial))
         said += noticed
     said += _without_heading(checked) + _coming_to_rest(checked)
@@ -200,6 +202,7 @@ def _coming_to_rest(runs: list[Run]) -> list[str]:
 
 def _checked(trial: Trial, axle: RearAxle, mass: float) -> tuple[Trial, list[str]]:
     """The trial as it is used, and what was noticed."""
+    trial_checks.check_length(trial)
     trial, said = without_lost(trial, axle)
     stages = (
         trial_checks.measured_part,

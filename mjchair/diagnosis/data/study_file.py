@@ -6,6 +6,7 @@ In: a folder with a study.toml and tables. Out: a `Study`. What is wrong is one 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -14,7 +15,7 @@ import mujoco
 import numpy as np
 from msgspec import Meta, Struct, structs
 
-from mjchair.diagnosis.data import unit_checks
+from mjchair.diagnosis.data import saturation, unit_checks
 from mjchair.diagnosis.data.roughly_known import nuisances
 from mjchair.diagnosis.data.study import Run, Study, make_study, with_copied_wheels
 from mjchair.errors import MjchairError, nearest
@@ -25,6 +26,7 @@ from mjchair.model.load import Load
 from mjchair.model.parameters import ChairParameters
 from mjchair.model.spec import load_spec
 from mjchair.rider.rider import RIDERS
+from mjchair.simulation.channels import channel_units
 from mjchair.simulation.initial import Initial
 from mjchair.toml_file import read_toml
 from mjchair.units import quantity
@@ -146,14 +148,9 @@ def read_study(folder: str | os.PathLike[str]) -> Study:
         _check_finite(values, name, path)
     _check_choice("rider is", entry.rider, RIDERS, path)
     spec = _spec(entry, path)
-    runs = _runs(entry, path, spec.copy().compile())
-    measured = {c for run in runs for c in run.trial.channels}
-    measured |= {c.rsplit(".", 1)[0] for c in measured}
-    notes = [
-        f"noise of {channel} is given, and no run measures it"
-        for channel in noise
-        if channel not in measured
-    ]
+    model = spec.copy().compile()
+    runs = _runs(entry, path, model)
+    notes = _unmeasured(noise, runs, model, path)
     study = make_study(spec, runs, noise, entry.nuisance, notes, str(path.parent))
     known = replace(
         study,
@@ -164,7 +161,7 @@ def read_study(folder: str | os.PathLike[str]) -> Study:
     )
     channels = with_copied_wheels(known).channels
     nuisances(channels, known.nuisance, known.driven_as_measured)  # an unknown one is refused
-    return known
+    return replace(known, notes=(*known.notes, *saturation.notes(known)))
 
 
 def _measured(entry: StudyEntry) -> bool:
@@ -190,6 +187,33 @@ def _noise(entry: StudyEntry, path: Path) -> tuple[dict[str, float], dict[str, f
         else:
             channels[name] = value
     return channels, process.given()
+
+
+def _unmeasured(
+    noise: Mapping[str, float], runs: Sequence[Run], model: mujoco.MjModel, path: Path
+) -> list[str]:
+    """A note on each noise that is given of a channel which no run measures.
+
+    Raises:
+      MjchairError: the noise of what is no channel.
+    """
+    measured = _with_sensors({c for run in runs for c in run.trial.channels})
+    known = measured | _with_sensors(channel_units(model))
+    for channel in noise:
+        if channel not in known:
+            raise MjchairError(
+                f"{path}: [noise] has {channel!r}, which is no channel" + nearest(channel, known)
+            )
+    return [
+        f"noise of {channel} is given, and no run measures it"
+        for channel in noise
+        if channel not in measured
+    ]
+
+
+def _with_sensors(channels: Iterable[str]) -> set[str]:
+    """Channels, and the sensors with several of them: imu_gyro beside imu_gyro.z."""
+    return {name for c in channels for name in (c, c.rsplit(".", 1)[0])}
 
 
 def _check_finite(values: dict[str, float], what: str, path: Path) -> None:

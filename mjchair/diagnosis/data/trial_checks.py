@@ -35,6 +35,7 @@ STILL = {  # averages below which a channel says that the chair stands, SI
 STAYS = {"_angle": 0.1, "position.x": 0.05, "position.y": 0.05, "heading": 0.05}  # ranges, SI
 MOVES = (*STILL, "_angle", "position.x", "accelerometer.z")  # a rolling chair's are not zero
 SIDES = {"left": "right", "right": "left"}
+ALIKE = 0.2  # rms of the difference of both torques over their mean: pushes alike (assumption)
 TURNS = {"imu_gyro.z", "heading", "position.y", "velocity.y"}  # tell how a chair turns
 
 
@@ -68,13 +69,18 @@ def check(trial: Trial) -> None:
     Raises:
       MjchairError: too short, too few samples, a clock that jumps, inputs outside the run's time.
     """
-    _check_length(trial)
+    check_length(trial)
     _check_clock(trial)
     if trial.inputs is not None:
         _check_inputs(trial, trial.inputs)
 
 
-def _check_length(trial: Trial) -> None:
+def check_length(trial: Trial) -> None:
+    """Refuse a run that holds no window.
+
+    Raises:
+      MjchairError: it is too short.
+    """
     lasts = float(trial.time[-1] - trial.time[0])
     if lasts < SHORTEST:
         raise MjchairError(
@@ -192,7 +198,7 @@ def with_copied_wheel(trial: Trial) -> Trial:
     a deceleration. A run that tells how it turns, or measures no wheel, stays as it is.
     """
     seen = _sides_seen(trial.channels)
-    if len(seen) != 1 or tells_turning(trial.channels):
+    if len(seen) != 1 or tells_turning(trial.channels) or not _driven_alike(trial):
         return trial
     side = seen[0]
     more = {
@@ -203,28 +209,42 @@ def with_copied_wheel(trial: Trial) -> Trial:
     return replace(trial, channels=MappingProxyType({**trial.channels, **more}))
 
 
+def _driven(trial: Trial) -> list[str]:
+    """The sides whose wheel has a torque."""
+    return [s for s in SIDES if trial.inputs is not None and f"{s}_wheel" in trial.inputs.controls]
+
+
+def _driven_alike(trial: Trial) -> bool:
+    """Whether nothing says that the two wheels are driven unlike: one torque stands for both."""
+    if trial.inputs is None or len(_driven(trial)) < 2:
+        return True
+    left, right = (trial.inputs.at(f"{side}_wheel", trial.time) for side in SIDES)
+    unlike, common = (np.sqrt(np.mean(np.square(t))) for t in (left - right, 0.5 * (left + right)))
+    return bool(unlike <= ALIKE * common)
+
+
 def other_side(trial: Trial) -> tuple[Trial, list[str]]:
     """The run with the wheel that was not measured taken to be like the other one, and a note.
 
-    Where nothing tells how the chair turns, one instrumented wheel stands for both. Where the
-    other wheel or a turn was measured, a wheel without a torque column is not driven.
+    Where nothing tells how the chair turns, one instrumented wheel stands for both, unless both
+    are driven and not alike. Where the other wheel or a turn was measured, a wheel without a torque
+    column is not driven.
     """
-    driven = [
-        s for s in SIDES if trial.inputs is not None and f"{s}_wheel" in trial.inputs.controls
-    ]
-    seen = _sides_seen(trial.channels)
-    turns = tells_turning(trial.channels)
-    if turns and len(driven) == 1:
+    driven, seen = _driven(trial), _sides_seen(trial.channels)
+    if tells_turning(trial.channels):
+        if len(driven) != 1:
+            return trial, []
         other = SIDES[driven[0]]
         return trial, [f"{trial.name}: no torque column of the {other} wheel; it is not driven"]
-    if turns or len(driven) == 2 or not (driven or len(seen) == 1):
+    if len(seen) != 1 and len(driven) != 1:
         return trial, []
-    side = (driven or seen)[0]
-    said = (
-        f"{trial.name}: only the {side} wheel was measured; the {SIDES[side]} one is assumed "
-        "alike, and nothing tells how the chair turns"
-    )
-    if not driven or trial.inputs is None:
+    side = seen[0] if len(driven) == 2 else (driven or seen)[0]
+    said = f"{trial.name}: only the {side} wheel was measured; the {SIDES[side]} one is "
+    if not _driven_alike(trial):
+        said += "driven unlike it, so it is simulated; nothing tells how the chair turns"
+        return trial, [said]
+    said += "assumed alike, and nothing tells how the chair turns"
+    if trial.inputs is None or len(driven) != 1:
         return trial, [said]
     controls = dict(trial.inputs.controls)
     controls[f"{SIDES[side]}_wheel"] = controls[f"{side}_wheel"]

@@ -26,6 +26,7 @@ TURN = 2.0 * np.pi + 0.2  # rad, within which a heading begins
 NEAR = 1.3  # factor within which two stories differ by a unit
 ALIKE = 0.95  # cosine of two stories that are one
 FORWARD, YAW, PULL = 0.05, 0.03, 0.05  # m/s, rad/s and m/s: motion below which nothing is compared
+OTHER_START = 1.0  # m/s, and the speed itself, by which a first speed is not the one that is seen
 WAY = 0.5  # m by the wheels, below which it is not compared with the places
 LENGTHS = {"mm": 1e3, "cm": 1e2, "in": 39.37}  # units of a length that people use, a metre
 
@@ -70,6 +71,20 @@ def check_initial(given: Mapping[str, object], name: str) -> None:
             f"{name}: the initial heading looks like degrees: it is {heading:g}, and a turn is "
             f"6.28 rad; give {heading / DEGREES:.4g}"
         )
+
+
+def check_first_speed(trial: Trial, axle: RearAxle, speed: float) -> None:
+    """Refuse a first speed (m/s) that is not the one at which the chair is seen to roll.
+
+    Raises:
+      MjchairError: naming the channel.
+    """
+    for name, story in forward(trial, axle).items():
+        if story.time.size and abs(speed - story.values[0]) > OTHER_START + abs(story.values[0]):
+            raise MjchairError(
+                f"{trial.name}: its initial speed is {speed:g} m/s, and by {name} it starts at "
+                f"{story.values[0]:.2g} m/s; leave one of them out, or give it in m/s"
+            )
 
 
 def _refuse(trial: Trial, name: str, what: str, why: str, *units: str) -> NoReturn:
