@@ -31,6 +31,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "kg": ("kg", 1.0),
     "lb": ("kg", 0.45359237),
     "N": ("N", 1.0),
+    "kN": ("N", 1000.0),
     "N m": ("N m", 1.0),
     "Nm": ("N m", 1.0),
     "N mm": ("N m", 1e-3),

@@ -1,5 +1,6 @@
 """Identification from rig data: known tires recovered, and what cannot be known said."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -149,3 +150,62 @@ def test_an_unknown_family_is_refused():
     table, _ = made(tire())
     with pytest.raises(MjchairError, match=r"'pac98' cannot be fitted.*pac89"):
         identify(table, "pac98")
+
+
+def test_forces_of_the_other_sign_are_refused_by_the_option():
+    table, _ = made(tire(), seed=6, toe=1.0, angles=(-10, -5, -1, 1, 5, 10))
+    with pytest.raises(
+        MjchairError, match=r"sign of the slip angle in 3[0-9] of 36 .*give --paper"
+    ):
+        identify(replace(table, fy=-table.fy))
+    turned = replace(table, fy=-table.fy, paper_sign=True)
+    with pytest.raises(MjchairError, match="leave out --paper-sign"):
+        identify(turned)
+
+
+@pytest.mark.parametrize("hidden", [{"toe": -4.0}, {"camber": 8.0}, {"offset": 25.0}])
+def test_a_hidden_cause_is_not_taken_for_the_other_sign(hidden):
+    table, _ = made(tire(), seed=6, **hidden)
+    identify(table, starts=1)
+
+
+def test_slip_angles_in_radians_are_refused_by_the_heading():
+    table, _ = made(tire("wheelchair"), seed=6)
+    with pytest.raises(MjchairError, match=r"0.26\d* deg only.*radians.*'slip_angle \[rad\]'"):
+        identify(replace(table, angle=np.radians(table.angle)))
+
+
+def test_small_angles_of_a_stiff_tire_are_not_radians():
+    stiff = tire("wheelchair").with_(stiffness_factor=4.0)
+    table, _ = made(stiff, seed=6, angles=(-1, -0.5, 0.5, 1))
+    identify(table, starts=1)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_there_is_no_tire_in_noise(seed):
+    table, peak = made(tire(), seed=seed, angles=(-12, -8, -4, 4, 8, 12), repeats=3)
+    noise = np.random.default_rng(seed).normal(0.0, peak, len(table))
+    found, _ = identify(replace(table, fy=noise), starts=2)
+    assert found.unexplained > 0.8
+    with pytest.raises(MjchairError, match=r"residual of the fit is \d+ % of the force"):
+        found.tire("noise", tire(), "noise")
+
+
+def test_a_noisy_rig_is_still_fitted():
+    """A tenth of the largest force on each cell, several times what a rig has."""
+    table, _ = made(tire(), seed=7, noise=0.1)
+    found, _ = identify(table, starts=2)
+    assert 0.02 < found.unexplained < 0.2
+    assert found.tire("noisy", tire(), "a test").name == "noisy"
+
+
+def test_an_outlier_is_named_by_its_row_and_nothing_else_is():
+    table, _ = made(tire(), seed=8, repeats=4)
+    assert identify(table, starts=1)[0].far_rows() == []
+    bad = table.fy.copy()
+    bad[10] *= 10.0
+    (index, residual, times), *rest = identify(replace(table, fy=bad), starts=1)[0].far_rows()
+    assert index == 10
+    assert rest == []
+    assert residual == pytest.approx(0.9 * bad[10], rel=0.3)
+    assert times > 6.0

@@ -4,6 +4,7 @@ import csv
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mjchair.cli import main
@@ -105,3 +106,38 @@ def test_what_a_tire_file_has_besides_is_listed(tmp_path, capsys):
     arguments = ["rig", "--tire", str(path), "--angles", "5", "--loads", "110"]
     assert main([*arguments, "--speeds", "0.05", "--out", str(tmp_path / "rig")]) == 0
     assert "not used of the tire's file: VERTICAL.VERTICAL_STIFFNESS" in capsys.readouterr().out
+
+
+def lines_of(force):
+    """A rig table of the shipped tire, its forces changed by `force(row, fy)`."""
+    tire = read(Path(__file__).parents[1] / "models" / "tires" / "wheelchair.toml")
+    rows = ["slip_angle_deg,load_n,fy_n"]
+    for load in (100.0, 200.0, 300.0):
+        for angle in (-12, -8, -4, -2, 2, 4, 8, 12):
+            fy = float(tire.forces(load, 0.0, np.radians(angle)).Fy)
+            rows.append(f"{angle},{load},{force(len(rows), fy):.4f}")
+    return "\n".join(rows) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("force", "message"),
+    [
+        (lambda row, fy: -fy, "24 of 24 runs, and in ISO-W it has the other; give --paper-sign"),
+        (lambda row, fy: 100.0 * np.sin(1e3 * row**2), "% of the force, and of a tire it must be"),
+    ],
+)
+def test_data_without_a_tire_in_it_write_nothing(force, message, tmp_path, capsys):
+    (tmp_path / "rig.csv").write_text(lines_of(force))
+    assert main(["fit-tire", str(tmp_path / "rig.csv"), "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_outlier_is_noted_by_its_row(tmp_path, capsys):
+    (tmp_path / "rig.csv").write_text(
+        lines_of(lambda row, fy: (10.0 if row == 14 else 1.0) * fy + np.sin(1e3 * row**2))
+    )
+    assert main(["fit-tire", str(tmp_path / "rig.csv"), "--out", str(tmp_path / "out")]) == 0
+    assert f"note: row 15 of {tmp_path / 'rig.csv'}: its lateral force" in capsys.readouterr().err

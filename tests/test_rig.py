@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mjchair.errors import MjchairError
+from mjchair.errors import MjchairError, MjchairNote
 from mjchair.simulation import rig
 from mjchair.simulation.rig import Faults, Point, measure, sweep
 from mjchair.tire import read
@@ -141,6 +141,28 @@ def test_an_empty_sweep_and_a_standing_table_are_refused():
         measure(tire(), [])
     with pytest.raises(MjchairError, match="travel"):
         measure(tire(), sweep(), travel=0.0)
+
+
+@pytest.mark.parametrize(
+    ("load", "largest", "message"),
+    [
+        (5000.0, 0.0, "load 5000 N is 24 times the nominal load of wheelchair_a0_148, 210 N"),
+        (1000.0, 0.0, None),
+        (9500.0, 9000.0, "load 9500 N is beyond FZMAX of book, 9000 N"),
+        (8500.0, 9000.0, None),
+    ],
+)
+def test_a_load_far_beyond_the_tires_is_noted(load, largest, message, recwarn):
+    from test_mf61 import book
+
+    from mjchair.tire import Tire
+
+    numbers = book(FZMAX=largest)
+    measured = Tire("book", "mf61", numbers, nominal_load=1000.0) if largest else tire()
+    rig._note_load(measured, load)
+    said = [str(w.message) for w in recwarn.list if w.category is MjchairNote]
+    assert len(said) == (message is not None)
+    assert message is None or message in said[0]
 
 
 def test_a_car_tire_of_a_tir_file_runs_on_the_rig(tmp_path):

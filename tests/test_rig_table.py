@@ -34,6 +34,20 @@ def test_what_is_written_reads(tmp_path):
     assert read_rig(path).fy[0] == -1 / 3
 
 
+def test_a_heading_may_carry_another_unit(tmp_path):
+    head = "slip_angle [rad],load [kN],fy [kN],camber [deg],kappa [%],speed [km/h],p [bar],fx [N]"
+    table = read_rig(put(tmp_path, f"{head}\n0.1,0.2,-0.05,3,5,36,2.4,7\n"))
+    assert table.angle[0] == pytest.approx(np.degrees(0.1), rel=1e-15)
+    for name, value in (("load", 200), ("fy", -50), ("camber", 3), ("kappa", 0.05), ("speed", 10)):
+        assert getattr(table, name)[0] == pytest.approx(value, rel=1e-14), name
+    same = read_rig(put(tmp_path, "slip_angle [deg],load_n [N],fy_n\n0.1,0.2e3,-5\n"))
+    assert (same.angle[0], same.load[0], same.fx[0]) == (
+        0.1,
+        200.0,
+        pytest.approx(np.nan, nan_ok=True),
+    )
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -48,6 +62,15 @@ def test_what_is_written_reads(tmp_path):
         ("slip_angle_deg,load_n,fy_n\n1,-2,3\n", "load_n in row 2 is -2"),
         ("slip_angle_deg,load_n,fy_n,fy_n\n1,2,3,3\n", "twice"),
         ("slip_angle_deg,load_n,fy_n,turned\n1,2,3,5\n", "turned in row 2 is 5"),
+        ("Slip_Angle_Deg,load_n,fy_n\n1,2,3\n", "no column 'slip_angle_deg'; is it 'Slip_Ang"),
+        ("slip_angle_rad,load_n,fy_n\n1,2,3\n", r"is it 'slip_angle_rad'\?.*slip_angle \[rad\]"),
+        ("slip_angle_deg,Load,fy_n\n1,2,3\n", "no column 'load_n'; is it 'Load'"),
+        ("slip_angle_deg,load_n,fy\n1,2,3\n", r"is it 'fy'\? name it fy_n or 'fy \[N\]'"),
+        ("slip_angle_deg,load [kN],load_n,fy_n\n1,2,3,4\n", "twice"),
+        ("slip_angle_deg,load [kg],fy_n\n1,2,3\n", r"'load \[kg\]'; it must be in N or kN"),
+        ("slip_angle_deg,load [stone],fy_n\n1,2,3\n", "unknown unit 'stone'"),
+        ("slip_angle_deg,load_n [kN],fy_n\n1,2,3\n", r"'load_n \[kN\]'; it must be in N$"),
+        ("slip_angle_deg,load_n,fy_n\n1,0.1,3\n2,0.45,3\n", r"0.45 N only.* 'load \[kN\]'"),
     ],
 )
 def test_bad_tables_get_one_line(tmp_path, text, message):

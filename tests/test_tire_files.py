@@ -118,6 +118,9 @@ def test_what_is_not_there_gets_one_line(tmp_path):
         ('family = "pac89"\nload_unit = "N"\n[coefficients]\na = 3', "a must be a list of 1 to 14"),
         ('family = "linear"\nrelaxation_x = 0\n[coefficients]\ncornering_stiffness = 1', "is 0"),
         ("a = " + "[" * 5000, "not TOML"),
+        ('family = "linear"\n[coefficients]\nfriction = 1', "slip stiffness is 0.*_stiffness"),
+        ('family = "pac89"\nload_unit = "N"\n[coefficients]\na = [1.3, 0, 0.8, 0, 9]', "a3 and a4"),
+        ('family = "linear"\nside = "top"\n', "unknown side 'top'.*left, right, symmetric"),
     ],
 )
 def test_bad_toml_gets_one_line(tmp_path, text, message):

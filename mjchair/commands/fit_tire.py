@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from mjchair.identification.causes import Verdict
     from mjchair.identification.fit import Estimate, Fit
 
+MOST_NAMED = 5  # rows far off that are named one by one
+
 
 def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the subcommand."""
@@ -27,7 +29,11 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
         "Writes the tire (for --tire), fit.txt, fit.json and fit.png. Forces are ISO-W: negative "
         "for a positive slip angle.",
     )
-    parser.add_argument("table", metavar="CSV", help="slip_angle_deg, load_n, fy_n and others")
+    parser.add_argument(
+        "table",
+        metavar="CSV",
+        help="slip_angle_deg, load_n, fy_n and others; also with a unit: 'slip_angle [rad]'",
+    )
     parser.add_argument(
         "--family", default="pac89", help="pac89 (default), quadratic, linear or mf61"
     )
@@ -77,6 +83,7 @@ def run(args: argparse.Namespace) -> int:
         f"and slip angles to {abs(table.angle).max():g} deg; beyond them it is extrapolated"
     )
     tire = tire_fit.tire(args.name, like, source)
+    _notes(tire_fit)
     folder = output_folder(args.out, args.force)
     write(tire, folder / f"{args.name}.{args.format}")
     save(tire_fit_figures.fitted(tire_fit), folder / "fit.png")
@@ -85,6 +92,27 @@ def run(args: argparse.Namespace) -> int:
     write_whole(folder / "fit.json", json.dumps(_record(tire_fit, verdict), indent=1) + "\n")
     print(text + f"Written to {folder}; use it with --tire {folder / args.name}.{args.format}")
     return 0
+
+
+def _notes(tire_fit: Fit) -> None:
+    """Say what of the data the fit does not follow."""
+    from mjchair.errors import note
+    from mjchair.identification.fit import LARGE_RESIDUAL
+
+    far = tire_fit.far_rows()
+    for index, residual, times in far[:MOST_NAMED]:
+        note(
+            f"row {index + 2} of {tire_fit.table.source}: its lateral force "
+            f"{tire_fit.table.fy[index]:.4g} N is {abs(residual):.4g} N from the fit, "
+            f"{times:.0f} times the usual residual; check it, or leave the row out"
+        )
+    if len(far) > MOST_NAMED:
+        note(f"{len(far) - MOST_NAMED} more rows are as far from the fit")
+    if tire_fit.unexplained > LARGE_RESIDUAL:
+        note(
+            f"the residual of the fit is {100.0 * tire_fit.unexplained:.0f} % of the force; the "
+            "tire follows these data badly"
+        )
 
 
 def report(tire_fit: Fit, verdict: Verdict, others: list[Fit]) -> str:

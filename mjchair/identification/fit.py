@@ -35,6 +35,13 @@ FIRST_NOISE = 0.02  # over the largest force; first estimate, replaced by the no
 LEAST_NOISE = 1e-4  # over the largest force: rounding, and errors of the formula
 NOISE_UPDATES = 6  # how often the noise is estimated anew, at most
 UNDETERMINED = 0.5  # standard error over prior spread; a parameter above it is undetermined
+MOST_RESIDUAL = 0.5  # rms residual over rms force, from which there is no tire: see Fit.tire
+LARGE_RESIDUAL = 0.2  # from which it is said; rigs reach 0.02 to 0.05
+FAR = 6.0  # robust standard deviations from which a row's residual is far off; normal noise: 2e-9
+FAR_OF_FORCE = 0.05  # and the least part of the rms force that it then is
+FAR_OF_FARTHEST = 0.5  # and of the farthest, which pulls the fit and so pushes good rows off
+WRONG_SIGN = 0.75  # share of the runs whose force has the sign of the slip angle: toe makes some
+STIFFEST = 100.0  # 1/rad, force over load and slip angle: racing tires reach 50; an assumption
 STRONG_CORRELATION = 0.95  # correlations of two parameters above this value are reported
 
 
@@ -144,6 +151,36 @@ class Fit:
         half = stats.t.ppf(0.975, self.degrees) * np.sqrt(variance)
         return base.reshape(angle.shape), half.reshape(angle.shape)
 
+    def far_rows(self) -> list[tuple[int, float, float]]:
+        """Runs far outside the scale of the residuals, the farthest first.
+
+        Returns:
+          For each its index in the table, its residual (N), and that over the robust standard
+          deviation of all lateral residuals (1.48 of the median of their sizes).
+        """
+        residual = self.residuals[: len(self.table)]
+        size = np.abs(residual)
+        scale = max(1.4826 * float(np.median(size)), LEAST_NOISE * _rms(self.table.fy))
+        far = np.flatnonzero(
+            (size > FAR * scale) & (size > FAR_OF_FORCE * _rms(self.table.fy)) & ~_stated(self)
+        )
+        far = far[np.argsort(-size[far])]
+        far = far[size[far] > FAR_OF_FARTHEST * np.max(size[far], initial=0.0)]
+        return [(int(i), float(residual[i]), float(size[i] / scale)) for i in far]
+
+    @property
+    def unexplained(self) -> float:
+        """Rms lateral residual over rms lateral force of the runs that are not far off, 1.
+
+        It is 1 where the fit says nothing of the force, whatever its size, and the relative noise
+        where it says all. It is taken about 0 and not about the mean force, since a table of a
+        tire that slides may have nearly the same force in every run.
+        """
+        kept = np.ones(len(self.table), bool)
+        kept[[i for i, _, _ in self.far_rows()]] = False
+        force = _rms(self.table.fy[kept])
+        return _rms(self.residuals[: len(self.table)][kept]) / force if force > 0.0 else 1.0
+
     def criteria(self) -> tuple[float, float]:
         """AIC and BIC of the residuals, with the effective number of parameters."""
         m = self.residuals.size
@@ -158,7 +195,17 @@ class Fit:
           name: of the new tire. source: text for the tire file on where the numbers come from.
           like: tire from which everything is taken that a steady rig does not measure: relaxation
             lengths, damping, rolling resistance, pneumatic trail and radius.
+
+        Raises:
+          MjchairError: the residual is as large as the force (`unexplained`): there is no tire in
+            such data.
         """
+        if self.unexplained > MOST_RESIDUAL:
+            raise MjchairError(
+                f"{self.table.source}: the residual of the fit is {100.0 * self.unexplained:.0f} % "
+                f"of the force, and of a tire it must be below {100.0 * MOST_RESIDUAL:.0f} %; are "
+                "slip angle, load and force of one run in each row, and in their units?"
+            )
         not_measured = {
             item: getattr(like, item)
             for item in (
@@ -199,7 +246,8 @@ def identify(
       seed: of the random starting points. starts: how many starting points.
 
     Raises:
-      MjchairError: too few runs, angles or loads, or an unknown family.
+      MjchairError: too few runs, angles or loads, forces of the other sign, slip angles that are
+        most likely in another unit, or an unknown family.
     """
     _check(table)
     model = curve(family, table)
@@ -318,6 +366,15 @@ def fit(
     )
 
 
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
+
+
+def _stated(fitted: Fit) -> NDArray[np.bool_]:
+    """Whether the table states the noise of a row (n,) itself; such a row may be as far as that."""
+    return np.asarray(np.isfinite(fitted.table.sigma))
+
+
 def _rounded(value: float, error: float) -> float:
     """The value rounded to about a thousandth of its standard error."""
     if not (np.isfinite(error) and error > 0.0):
@@ -386,4 +443,28 @@ def _check(table: RigTable) -> None:
         raise MjchairError(
             f"{table.source}: {len(table)} runs at {angles} slip angles and {loads} loads; a fit "
             "needs at least 4 runs at 2 slip angles (recommended: 12 runs, 4 angles, 3 loads)"
+        )
+    _check_angles(table)
+
+
+def _check_angles(table: RigTable) -> None:
+    """Refuse forces of the other sign, and slip angles that are most likely in radians."""
+    free = (table.kappa == 0.0) & (table.angle != 0.0) & (table.fy != 0.0)
+    angle, force, load = table.angle[free], table.fy[free], table.load[free]
+    if not angle.size:
+        return
+    same = int(np.sum(angle * force > 0.0))
+    if same > WRONG_SIGN * angle.size:
+        change = "leave out --paper-sign" if table.paper_sign else "give --paper-sign"
+        raise MjchairError(
+            f"{table.source}: the force has the sign of the slip angle in {same} of {angle.size} "
+            f"runs, and in ISO-W it has the other; {change}"
+        )
+    slope = float(np.median(np.abs(force / (load * np.radians(angle)))))
+    largest = float(np.max(np.abs(angle)))
+    if slope > STIFFEST and largest < 0.5 * np.pi:
+        raise MjchairError(
+            f"{table.source}: slip_angle_deg goes to {largest:g} deg only, which makes a stiffness "
+            f"of {slope:.0f} times the load, and tires have less than {STIFFEST:g}; in radians? "
+            "then name the column 'slip_angle [rad]'"
         )

@@ -410,6 +410,8 @@ def set_tires(
 ) -> None:
     """Write tires into the `user` fields of the geoms named `<wheel>_tire`; see `load_spec`.
 
+    A tire of one side of the vehicle is mirrored on wheels of the other side (`Tire.on`).
+
     Raises:
       MjchairError: an unknown tire or wheel, or a tire file that cannot be read.
     """
@@ -418,6 +420,7 @@ def set_tires(
     for key in groups:
         if key not in known:
             raise MjchairError(f"no wheel {key!r} to put a tire on" + nearest(key, known))
+    read: dict[str, Tire] = {}  # each file once, so that its notes come once
     for geom in spec.geoms:
         if not geom.name.endswith(SUFFIX):
             continue
@@ -430,7 +433,12 @@ def set_tires(
             if len(geom.userdata) and geom.userdata[block.TAG_AT] == block.TAG:
                 continue
             choice = DEFAULT_TIRES[group]
-        packed = read_tire(choice).block()
+        if not isinstance(choice, Tire):
+            name = str(choice)
+            if name not in read:
+                read[name] = read_tire(choice)
+            choice = read[name]
+        packed = choice.on(wheel.partition("_")[0]).block()
         packed[block.RADIUS] = geom.size[0]
         geom.userdata = packed
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from mjchair.engine.install import installed
-from mjchair.errors import MjchairError
+from mjchair.errors import MjchairError, note
 from mjchair.model import assets
 from mjchair.model.wheels import check_timestep
 from mjchair.tire import Tire, law
@@ -42,6 +42,7 @@ SAMPLES = 200  # of a trace
 STEADY = 0.1  # share of a trace, at its end, that is averaged
 LONGEST_STEP = 0.02  # s
 CELL_ARM = 0.3  # m, of the lateral cells ahead of and behind the wheel
+FAR = 5.0  # times the nominal load, from which a tire's formula is far extrapolated: an assumption
 HELD = 1e9  # kg m^2, armature of a wheel whose spin is prescribed
 
 
@@ -175,6 +176,7 @@ def measure(
         raise MjchairError("the sweep has no points; give an angle, a load and a speed")
     if not travel > 0.0:
         raise MjchairError(f"travel is {travel:g} relaxation lengths; it must be above 0")
+    _note_load(tire, max(point.load for point in points))
     with installed(), ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
         coming = pool.map(lambda point: _run(tire, point, faults, travel), points)
         disable = None if progress else True
@@ -182,11 +184,26 @@ def measure(
     return _with_noise(runs, faults)
 
 
+def _note_load(tire: Tire, largest: float) -> None:
+    """Note a load (N) that is far beyond those that the tire's numbers are for."""
+    limit = tire.coefficients.get("FZMAX", 0.0)
+    if 0.0 < limit < largest:
+        note(
+            f"the load {largest:g} N is beyond FZMAX of {tire.name}, {limit:g} N; its formula is "
+            f"held at {limit:g} N"
+        )
+    elif limit <= 0.0 and largest > FAR * tire.nominal_load:
+        note(
+            f"the load {largest:g} N is {largest / tire.nominal_load:.0f} times the nominal load "
+            f"of {tire.name}, {tire.nominal_load:g} N; its formula is extrapolated to it"
+        )
+
+
 def specification(tire: Tire, point: Point, faults: Faults | None = None) -> mujoco.MjSpec:
     """The rig set up for a point, with the tire on its wheel, ready to compile."""
     faults = faults or Faults()
     spec = mujoco.MjSpec.from_file(str(assets.folder() / "rig" / "sliding_table.xml"))
-    packed = mirrored(tire).block() if point.turned else tire.block()
+    packed = turned_round(tire).block() if point.turned else tire.block()
     geom, radius = spec.geom("wheel_tire"), float(tire.radius)
     geom.size = (radius, radius, 0.5 * radius * math.sqrt(0.2))
     geom.userdata = packed
@@ -211,7 +228,7 @@ def _strengthen(spec: mujoco.MjSpec, factor: float) -> None:
         body.inertia = np.asarray(body.inertia) * factor
 
 
-def mirrored(tire: Tire) -> Tire:
+def turned_round(tire: Tire) -> Tire:
     """The tire turned round on its axle: its conicity points the other way.
 
     In PAC89 the shifts of the force (a12 in proportion to the load, a13 constant) are conicity and

@@ -4,7 +4,8 @@ In: the text of a file. Out: a `Tire`; or a `Tire` in and the text out.
 
 Sections in brackets hold lines ``KEY = value``; ``$`` and ``!`` start comments; a section may hold
 a table of bare rows. Values left blank count as left out. What this project does not use goes into
-`Tire.unused`, with its text, and is written back.
+`Tire.unused`, with its text, and is written back. A key that is none of the Magic Formula's is
+refused where it is a slip away from one that the file lacks, and else named in a note.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import fields
 
-from mjchair.errors import MjchairError, nearest
+from mjchair.errors import MjchairError, nearest, note
 from mjchair.tire.formula.mf_names import SECTIONS_52, SECTIONS_61
-from mjchair.tire.tire import Tire
+from mjchair.tire.tir_keys import KNOWN, KNOWN_SECTIONS, SAID_IN_MODEL, SIDE, meant
+from mjchair.tire.tire import SIDES, Tire
 
 UNITS = {
     "LENGTH": ("meter", "metre", "m", "meters"),
@@ -53,8 +55,10 @@ REQUIRED = {
     "pac89": ("LATERAL_COEFFICIENTS",),
 }
 REQUIRED["mf61"] = REQUIRED["mf52"]
+NO_SIDE = ("", "unknown")  # what stands for a side that was not said
 OWN = "MJCHAIR"  # this project's section: the numbers of the standstill law
 OWN_TEXTS = ("NAME", "SOURCE", "LOAD_UNIT")
+ASSUMED_RADIUS = next(item.default for item in fields(Tire) if item.name == "radius")
 DAMPING_TIME = 0.001  # s, where the file has no [MJCHAIR]: an assumption
 
 Raw = dict[str, dict[str, str]]  # section -> key -> text
@@ -65,13 +69,14 @@ def parse(text: str, stem: str) -> Tire:
 
     Raises:
       MjchairError: a line that is none, a key or a section twice, a section missing, units other
-        than SI, a format that is not known, or as Tire does.
+        than SI, a format or a side that is not known, a misspelled key, or as Tire does.
     """
     raw = _sections(text)
     _check_units(_section(raw, "UNITS"))
     family = _family(_section(raw, "MODEL"))
     for section in REQUIRED[family]:
         _section(raw, section)
+    _check_keys(raw, family, stem)
     own = {key: _bare(text) for key, text in raw.get(OWN, {}).items()}
     coefficients = _coefficients(raw, family)
     if family == "pac89":
@@ -83,9 +88,10 @@ def parse(text: str, stem: str) -> Tire:
         name=own.get("NAME", stem),
         family=family,
         source=own.get("SOURCE", ""),
+        side=_side(raw["MODEL"]),
         coefficients=coefficients,
         unused=_unused(raw, family),
-        **_fields(raw, own, family, coefficients),
+        **_fields(raw, own, family, coefficients, stem),
     )
 
 
@@ -109,6 +115,8 @@ def compose(tire: Tire) -> str:
     _put(out, "MODEL", {"PROPERTY_FILE_FORMAT": "'PAC89'"} if tire.family == "pac89" else {})
     if tire.family != "pac89" and not _said_format(out["MODEL"]):
         _put(out, "MODEL", {"FITTYP": "61" if tire.family == "mf61" else "6"})
+    if tire.side:
+        _put(out, "MODEL", {SIDE: f"'{tire.side.upper()}'"})
     for section in REQUIRED[tire.family]:
         _put(out, section, {})
     for section, names in SECTIONS[tire.family].items():
@@ -219,6 +227,31 @@ def _check_units(units: Mapping[str, str]) -> None:
             )
 
 
+def _check_keys(raw: Raw, family: str, stem: str) -> None:
+    """Refuse misspelled keys; note those that are none of the Magic Formula's.
+
+    A section of a name of its own may hold anything, but for a misspelled key.
+    """
+    used = {name for names in SECTIONS[family].values() for name in names} | {*SAID_IN_MODEL}
+    there = {key for lines in raw.values() for key in lines}
+    missing = used - there
+    if family == "pac89":  # a0 to c17 are too short to be told apart
+        missing &= {*SAID_IN_MODEL}
+    strange = []
+    for section, lines in raw.items():
+        if section in (OWN, "UNITS", "MDI_HEADER"):
+            continue
+        for key in lines:
+            if key in used or key in KNOWN or key.startswith("#"):
+                continue
+            if name := meant(key, missing):
+                raise MjchairError(f"[{section}] unknown key {key!r}; did you mean {name!r}?")
+            if section in KNOWN_SECTIONS:
+                strange.append(key)
+    if strange:
+        note(f"tire {stem}: left out keys that no .tir format has: {', '.join(strange)}")
+
+
 def _family(model: Mapping[str, str]) -> str:
     for key in ("FITTYP", "PROPERTY_FILE_FORMAT"):
         text = _bare(model.get(key, ""))
@@ -232,6 +265,17 @@ def _family(model: Mapping[str, str]) -> str:
             raise MjchairError(f"[MODEL] {key} {text!r} is not known" + nearest(text, FORMATS))
         return FORMATS[text]
     raise MjchairError("[MODEL] has no FITTYP (6: 5.2, 61, 62) or PROPERTY_FILE_FORMAT")
+
+
+def _side(model: Mapping[str, str]) -> str:
+    """The side of the vehicle that the coefficients hold for; "" where it is not said."""
+    text = _bare(model.get(SIDE, "")).lower()
+    if text in NO_SIDE:
+        return ""
+    if text not in SIDES:
+        allowed = ", ".join((*SIDES, "unknown")).upper()
+        raise MjchairError(f"[MODEL] {SIDE} is {text.upper()!r}; it must be one of {allowed}")
+    return text
 
 
 def _number(section: str, key: str, text: str) -> float | None:
@@ -271,7 +315,7 @@ def _pac89(capital: Mapping[str, float], unit: float) -> dict[str, float]:
 
 
 def _fields(
-    raw: Raw, own: Mapping[str, str], family: str, coefficients: Mapping[str, float]
+    raw: Raw, own: Mapping[str, str], family: str, coefficients: Mapping[str, float], stem: str
 ) -> dict[str, float]:
     """The other numbers of the tire: those of [MJCHAIR], else those that the file implies."""
     numbers = {"damping_time": DAMPING_TIME}
@@ -283,6 +327,8 @@ def _fields(
         radius = _number("DIMENSION", "UNLOADED_RADIUS", text)
     if radius:
         numbers["radius"] = radius
+    elif "RADIUS" not in own:
+        note(f"tire {stem}: no UNLOADED_RADIUS; {ASSUMED_RADIUS:g} m is taken")
     nominal = coefficients.get("FNOMIN") or 2000.0
     numbers["nominal_load"] = nominal
     known = {item.name.upper(): item.name for item in fields(Tire) if item.metadata}
@@ -312,5 +358,6 @@ def _lines(raw: Raw, known: set[str], family: str) -> Iterable[tuple[str, str, s
             continue
         for key, text in lines.items():
             said = key == "FITTYP" and _bare(text) in ("6", "61")
+            said |= key == SIDE and _bare(text).lower() not in NO_SIDE
             if not said and (key not in known or not _bare(text)):
                 yield section, key, text

@@ -25,6 +25,7 @@ from mjchair.tire.formula.family import Family
 
 LEAST_FRICTION = 0.01  # peak force over load; the family says the largest
 LOAD_UNITS = {"N": 1.0, "kN": 1000.0}
+SIDES = ("left", "right", "symmetric")
 
 
 class Forces(NamedTuple):
@@ -57,18 +58,23 @@ class Tire:
       family: a name in mjchair.tire.families.FAMILIES.
       coefficients: the family's, by name; those left out are 0.
       source: where the numbers come from.
+      side: "left" or "right", the side of the vehicle on which the coefficients hold: on the other
+        side the tire is its mirror image (`on`). "symmetric": no ply steer, no conicity and no
+        other difference between left and right, so the coefficients of them are left out. "": not
+        said; the tire is the same on both sides.
       unused: what its file has and this project does not use, as "SECTION.KEY": text.
       The others: see their metadata (unit, range, text), or `mjchair models`.
 
     Raises:
-      MjchairError: unknown family or coefficient, a number out of its range, a peak friction
-        outside 0.01-5, which is what a list in the wrong unit gives.
+      MjchairError: unknown family, side or coefficient, a number out of its range, a peak friction
+        outside 0.01-5, which is what a list in the wrong unit gives, or a slip stiffness of 0.
     """
 
     name: str
     family: str
     coefficients: Mapping[str, float]
     source: str = ""
+    side: str = ""
     unused: Mapping[str, str] = field(default_factory=dict)
     relaxation_x: float = quantity(0.04, "m", 0.0, 2.0, "relaxation length along the heading")
     relaxation_y: float = quantity(0.04, "m", 0.0, 2.0, "relaxation length across the heading")
@@ -100,6 +106,10 @@ class Tire:
             raise MjchairError(
                 f"tire {self.name}: unknown family {self.family!r}" + nearest(self.family, FAMILIES)
             )
+        if self.side not in ("", *SIDES):
+            raise MjchairError(
+                f"tire {self.name}: unknown side {self.side!r}" + nearest(self.side, SIDES)
+            )
         family = FAMILIES[self.family]
         names = family.coefficients
         for key, value in self.coefficients.items():
@@ -113,7 +123,13 @@ class Tire:
         object.__setattr__(
             self,
             "coefficients",
-            MappingProxyType({k: float(v) for k, v in self.coefficients.items()}),
+            MappingProxyType(
+                {
+                    k: float(v)
+                    for k, v in self.coefficients.items()
+                    if self.side != "symmetric" or k not in family.odd
+                }
+            ),
         )
         if self.coefficients.get("UNLOADED_RADIUS"):
             object.__setattr__(self, "radius", self.coefficients["UNLOADED_RADIUS"])
@@ -134,6 +150,7 @@ class Tire:
                     f"its own; give one above 0 m"
                 )
         self._check_friction()
+        self._check_stiffness()
 
     def _check_friction(self) -> None:
         peak = self.peak_friction(self.nominal_load)
@@ -144,6 +161,17 @@ class Tire:
                 raise MjchairError(
                     f"tire {self.name}: {axis} peak friction is {value:.4g} at "
                     f"{self.nominal_load:g} N; it must be within {low:g} to {high:g}{hint}"
+                )
+
+    def _check_stiffness(self) -> None:
+        """Refuse a tire without slip stiffness, which makes no force."""
+        slopes = law.family_stiffness(self.block(), self.nominal_load, 0.0, 1.0)[:2]
+        names = FAMILIES[self.family].slopes
+        for axis, slope, name in zip(("longitudinal", "lateral"), slopes, names, strict=True):
+            if slope == 0.0:
+                raise MjchairError(
+                    f"tire {self.name}: {axis} slip stiffness is 0 at {self.nominal_load:g} N; it "
+                    f"must be above 0, so give {name}"
                 )
 
     def peak_friction(self, fz: float) -> tuple[float, float]:
@@ -178,6 +206,19 @@ class Tire:
           gamma: camber, rad, about +x. speed: of the wheel along its heading, m/s.
         """
         return block_forces(self.block(), fz, kappa, alpha, gamma, speed)
+
+    def on(self, side: str) -> Tire:
+        """The tire as it is on the `side` of a vehicle, "left" or "right".
+
+        It is the mirror image of itself where its coefficients hold for the other side, and as it
+        is on a wheel of neither.
+        """
+        if self.side not in ("left", "right") or side not in ("left", "right"):
+            return self
+        if self.side == side:
+            return self
+        image = FAMILIES[self.family].mirrored(self.coefficients)
+        return replace(self, coefficients=image, side=side)
 
     def with_(self, **changes: float) -> Tire:
         """A copy with other numbers, checked like a new one."""

@@ -33,6 +33,7 @@ _TireEntry = defstruct(  # all that may stand in the file
         ("family", str),
         ("name", str, ""),
         ("source", str, ""),
+        ("side", str, ""),
         ("load_unit", str | None, None),
         *((name, float | None, None) for name in NUMBERS),
         ("coefficients", dict[str, Any], {}),
@@ -62,6 +63,7 @@ def parse(text: str, stem: str) -> Tire:
         name=entry.name or stem,
         family=entry.family,
         source=entry.source,
+        side=entry.side,
         coefficients=_coefficients(entry.coefficients, entry.family, entry.load_unit),
         unused=entry.unused,
         **numbers,
@@ -78,6 +80,8 @@ def compose(tire: Tire) -> str:
         if unit not in names:
             raise MjchairError(f"tire {tire.name}: load unit of {unit:g} N; it must be 1 or 1000")
         lines.append(f"load_unit = {_quoted(names[unit])}")
+    if tire.side:
+        lines.append(f"side = {_quoted(tire.side)}")
     lines.append(f"source = {_quoted(tire.source)}\n")
     for item in fields(tire):
         if item.metadata:

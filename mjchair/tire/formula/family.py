@@ -42,6 +42,9 @@ class Family:
       pack: (coefficients by name, radius in m) -> the numbers after the header, for a family that
         does more than put them in a row. It may raise MjchairError.
       largest_friction: peak force over load above which a tire is refused.
+      slopes: the coefficients of the slip stiffness along and across, for error lines.
+      odd: the coefficients that make a tire unlike its mirror image; they change their sign in it.
+      odd_ranges: (least, largest) of ranges that the mirror image has the other way round.
     """
 
     number: int
@@ -52,6 +55,9 @@ class Family:
     relaxation: Callable[..., Any] = no_relaxation
     pack: Callable[[Mapping[str, float], float], list[float]] | None = None
     largest_friction: float = LARGEST_FRICTION
+    slopes: tuple[str, str] = ("the slope", "the slope")
+    odd: tuple[str, ...] = ()
+    odd_ranges: tuple[tuple[str, str], ...] = ()
 
     @property
     def has_relaxation(self) -> bool:
@@ -70,3 +76,19 @@ class Family:
         if self.pack is not None:
             return self.pack(coefficients, radius)
         return [coefficients.get(name, 0.0) for name in self.coefficients]
+
+    def mirrored(self, coefficients: Mapping[str, float]) -> dict[str, float]:
+        """The coefficients of the mirror image of a tire, left side to the right.
+
+        Its forces at (kappa, alpha, gamma) are those of the tire at (kappa, -alpha, -gamma), Fy,
+        Mx and Mz with the other sign.
+        """
+        image = dict(coefficients)
+        image |= {name: -image[name] for name in self.odd if name in image}
+        for low, high in self.odd_ranges:
+            for name in (low, high):
+                image.pop(name, None)
+            for name, other in ((low, high), (high, low)):
+                if other in coefficients:
+                    image[name] = -coefficients[other]
+        return image

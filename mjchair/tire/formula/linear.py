@@ -69,6 +69,7 @@ LINEAR = Family(
     coefficients=("cornering_stiffness", "unused", "friction"),
     forces=forces,
     stiffness=stiffness,
+    slopes=("cornering_stiffness", "cornering_stiffness"),
 )
 QUADRATIC = Family(
     number=QUADRATIC_NUMBER,
@@ -76,4 +77,5 @@ QUADRATIC = Family(
     coefficients=("a", "b", "friction"),
     forces=forces,
     stiffness=stiffness,
+    slopes=("a and b", "a and b"),
 )

@@ -35,7 +35,7 @@ from numba.extending import register_jitable
 from mjchair.tire.block import FAMILY, RADIUS, Block
 from mjchair.tire.formula.family import Family
 from mjchair.tire.formula.mf_constants import AT, run_constants
-from mjchair.tire.formula.mf_names import NAMES_52, NAMES_61
+from mjchair.tire.formula.mf_names import NAMES_52, NAMES_61, ODD, ODD_RANGES
 
 NUMBER_52, NUMBER_61 = 3, 4  # of the families, in a block
 BELT_FRICTION = 5.0  # peak force over load: racing tires on test belts pass 3; an assumption
@@ -413,6 +413,9 @@ MF52 = Family(
     relaxation=relaxation,
     pack=partial(run_constants, version_52=True),
     largest_friction=BELT_FRICTION,
+    slopes=("PKX1", "PKY1"),
+    odd=ODD,
+    odd_ranges=ODD_RANGES,
 )
 MF61 = Family(
     number=NUMBER_61,
@@ -423,4 +426,7 @@ MF61 = Family(
     relaxation=relaxation,
     pack=partial(run_constants, version_52=False),
     largest_friction=BELT_FRICTION,
+    slopes=("PKX1", "PKY1"),
+    odd=ODD,
+    odd_ranges=ODD_RANGES,
 )

@@ -47,12 +47,11 @@ def run_constants(given: Mapping[str, float], radius: float, version_52: bool) -
       version_52: the file is of Magic Formula 5.2.
 
     Raises:
-      MjchairError: no nominal load, no shape factor or no load of greatest stiffness.
+      MjchairError: a number without which there is no force is missing or 0, or a number that no
+        tire has: see `_check`.
     """
     c = DEFAULTS | dict(given)
-    for name in ("FNOMIN", "PCX1", "PCY1", "PKY2"):
-        if c.get(name, 0.0) == 0.0:
-            raise MjchairError(f"{name} is missing or 0, so the formula has no scale; give it")
+    _check(c)
     get = _Numbers(c)
     r0 = c.get("UNLOADED_RADIUS", 0.0) or radius
     f0 = c["FNOMIN"] * c["LFZO"]
@@ -72,6 +71,44 @@ def run_constants(given: Mapping[str, float], radius: float, version_52: bool) -
     if version_52:
         _scale_camber(constants, get)
     return [constants[name] for name in CONSTANTS]
+
+
+NEEDED = ("FNOMIN", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2", "PKY4")
+ABOVE_ZERO = ("FNOMIN", "LFZO", "LCX", "LMUX", "LKX", "LCY", "LMUY", "LKY")
+NOT_BELOW_ZERO = ("LTR", "LMY", "LXAL", "LYKA", "LSGKP", "LSGAL")
+RANGES = ("PRES", "FZ", "KPU", "ALP", "CAM")  # each with MIN and MAX
+
+
+def _check(c: Mapping[str, float]) -> None:
+    """Refuse what no tire has.
+
+    Scaling factors of shifts and of camber may be negative: some mirror a tire with them.
+
+    Raises:
+      MjchairError: a number missing without which there is no force; a scaling factor, a range or
+        a stiffness that no tire has.
+    """
+    for name in NEEDED:
+        if c.get(name, 0.0) == 0.0:
+            raise MjchairError(f"{name} is missing or 0, so the formula has no scale; give it")
+    for name in ABOVE_ZERO:
+        if c[name] <= 0.0:
+            raise MjchairError(f"{name} is {c[name]:g}; it must be above 0")
+    for name in NOT_BELOW_ZERO:
+        if c[name] < 0.0:
+            raise MjchairError(f"{name} is {c[name]:g}; it must not be below 0")
+    for name in RANGES:
+        low, high = c.get(f"{name}MIN"), c.get(f"{name}MAX")
+        if low is not None and high is not None and low > high:
+            raise MjchairError(f"{name}MIN is {low:g}, above {name}MAX, {high:g}; exchange them")
+    if c["PKX1"] < 0.0:
+        raise MjchairError(f"PKX1 is {c['PKX1']:g}; a slip stiffness is above 0")
+    if c["PKY1"] * math.sin(c["PKY4"] * math.atan(1.0 / c["PKY2"])) >= 0.0:
+        with_ = "".join(f", {n} {c[n]:g}" for n in ("PKY2", "PKY4") if c[n] < 0.0)
+        raise MjchairError(
+            f"PKY1 is {c['PKY1']:g}{with_}: the lateral force would grow with the slip angle; in "
+            "the ISO axes of .tir files PKY1 is below 0"
+        )
 
 
 def pressure_change(c: Mapping[str, float]) -> float:

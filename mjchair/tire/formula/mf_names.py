@@ -1,6 +1,6 @@
 """What Magic Formula 5.2 and 6.1/6.2 files call their numbers, and what those are when left out.
 
-In: nothing. Out: names by section, and defaults.
+In: nothing. Out: names by section, those that change sign in the mirror image, and defaults.
 """
 
 from __future__ import annotations
@@ -51,6 +51,13 @@ SECTIONS_52 = {
 }
 NAMES_61 = tuple(name for names in SECTIONS_61.values() for name in names)
 NAMES_52 = tuple(name for names in SECTIONS_52.values() for name in names)
+
+# what makes a tire unlike its mirror image: ply steer, conicity, and curves that differ between
+# slip or camber to the left and to the right
+_ODD = "RHX1 QSX1 PEY3 PHY1 PHY2 PVY1 PVY2 RBY3 RVY1 RVY2 QBZ4 QDZ3 QDZ6 QDZ7 QEZ4 QHZ1 QHZ2 SSZ1"
+ODD = tuple(_ODD.split())
+# ranges that the mirror image has the other way round
+ODD_RANGES = (("ALPMIN", "ALPMAX"), ("CAMMIN", "CAMMAX"))
 
 # numbers left out are 0, but for these
 DEFAULTS = {name: 1.0 for name in SECTIONS_52["SCALING_COEFFICIENTS"]} | {

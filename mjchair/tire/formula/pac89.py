@@ -218,4 +218,6 @@ PAC89 = Family(
     ),
     forces=forces,
     stiffness=stiffness,
+    slopes=("b3 and b4 (a3 and a4 without b)", "a3 and a4"),
+    odd=("a9", "a10", "a12", "a13", "c12", "c13", "c16", "c17"),
 )
