@@ -193,6 +193,24 @@ def test_no_share_of_a_gap_is_shown_where_there_is_none():
     assert "closes" not in str(candidates.figure(none).axes[-1].get_xlabel())
 
 
+def test_what_the_corrected_chair_has_besides_is_to_be_measured_first():
+    found = diagnosis()
+    assert words.next_step(found) == "These data decide; use the corrected chair (model.xml)."
+    heavier = (Moved(name="mass", std=0.3, unit="1", by=1.27),)
+    much = dataclasses.replace(
+        found, evidence=dataclasses.replace(found.evidence, moved=heavier), next_experiment=""
+    )
+    assert "the mass of chair and person together by +38 % besides" in words.next_step(much)
+
+
+def test_one_run_is_not_called_several():
+    found = diagnosis()
+    one = dataclasses.replace(found.evidence, trials=found.evidence.trials[1:2])
+    alone = dataclasses.replace(found, evidence=one)
+    assert "parts of the run that it was not fitted to" in words.choice_words(alone)
+    assert "holds on runs that it was not fitted to" in words.choice_words(found)
+
+
 def test_a_named_effect_comes_with_value_and_uncertainty():
     said = words.missing(Diagnosis(verdict=Verdict.NAMED, effects=[ROLLING]))
     assert said == "The chair lacks **rolling resistance** (coefficient 0.01460 ± 0.00040)."

@@ -389,7 +389,7 @@ def _where(base: Base) -> list[Disagreement]:
                 statistic=float(cells.chi2[k] / cells.dof[k]),
             )
             for k, channel in enumerate(simulator.channels)
-            if cells.dof[k] >= 1.0
+            if cells.dof[k] >= 1.0 and channel not in simulator.study.copied
         ]
     return sorted(out, key=lambda entry: -entry.statistic)[:SHOWN]
 
@@ -427,7 +427,7 @@ def _notes(
             "the floor is looked for, such as a surface_patch ([trial.initial] gives a position)"
         )
     for channel, noise in base.bench.noise.items():
-        if noise.source != "study.toml":
+        if noise.source != "study.toml" and channel not in study.copied:
             notes.append(f"noise of {channel}: {noise.total:.3g} (SI), from {noise.source}")
     notes += base.dropped
     notes += choice.dropped if choice else []

@@ -63,14 +63,21 @@ def evidence(
     )
 
 
+def _measured(simulator: WindowSimulator) -> list[int]:
+    """Places of the channels that were measured, and not copied from the other wheel."""
+    copied = simulator.study.copied
+    return [k for k, channel in enumerate(simulator.channels) if channel not in copied]
+
+
 def _window_gaps(base: Base, fitted: Fitted | None) -> WindowGaps:
     simulator = base.bench.simulator
+    seen = _measured(simulator)
     return WindowGaps(
-        channels=tuple(simulator.channels),
+        channels=tuple(simulator.channels[k] for k in seen),
         trials=np.array([w.run for w in simulator.windows]),
         times=np.array([(w.first, w.last) for w in simulator.windows]),
-        before=_ratios(base.plain.system),
-        after=None if fitted is None else _ratios(fitted.system),
+        before=_ratios(base.plain.system)[seen],
+        after=None if fitted is None else _ratios(fitted.system)[seen],
         highest=BAND,
     )
 
@@ -201,11 +208,12 @@ def _whole_runs(base: Base, fitted: Fitted | None) -> tuple[WholeRun, ...]:
         with contextlib.suppress(MjchairError):
             new = _rolled(whole, simulator, fitted.variant, fitted.track)
     units = {c.name: c.unit for c in channels(simulator.base)}
-    out = []
+    out, seen = [], _measured(simulator)
+    names = [whole.channels[k] for k in seen]
     for k, w in enumerate(whole.windows):
-        run, measured = simulator.study.runs[w.run], whole.measured(w)
+        run, measured = simulator.study.runs[w.run], whole.measured(w)[:, seen]
         beside = [
-            None if values is None else _beside(measured, values[k], whole.channels)
+            None if values is None else _beside(measured, values[k][:, seen], names)
             for values in (old, new)
         ]
         assert beside[0] is not None
@@ -214,9 +222,9 @@ def _whole_runs(base: Base, fitted: Fitted | None) -> tuple[WholeRun, ...]:
                 trial=run.trial.name,
                 held_out=run.hold_out,
                 time=run.trial.time[w.rows],
-                channels=tuple(whole.channels),
-                units=tuple(units.get(c, "SI") for c in whole.channels),
-                noise=np.array([base.bench.noise[c].total for c in whole.channels]),
+                channels=tuple(names),
+                units=tuple(units.get(c, "SI") for c in names),
+                noise=np.array([base.bench.noise[c].total for c in names]),
                 measured=measured,
                 before=beside[0],
                 after=beside[1],

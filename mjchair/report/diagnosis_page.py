@@ -111,6 +111,7 @@ def page(
         "process": words.process_words(diagnosis),
         "drivers": words.driver_words(diagnosis),
         "alike": words.alike_words(diagnosis),
+        "other_runs": words.other_runs(diagnosis),
         "choice": words.choice_words(diagnosis),
         "left": words.left_words(diagnosis),
         "runs": words.runs_words(diagnosis),
@@ -314,10 +315,19 @@ def _moved(diagnosis: Diagnosis) -> Table:
         Head("quantity"),
         Head("prior standard deviation", True),
         Head("unit"),
-        Head("moved by (prior standard deviations)", True),
+        Head("moved by", True),
+        Head("in prior standard deviations", True),
     ]
     rows = [
-        Row([diagnosis_words.plain_name(m.name), f"{m.std:.3g}", m.unit, f"{m.by:+.2f}"])
+        Row(
+            [
+                diagnosis_words.plain_name(m.name),
+                f"{m.std:.3g}",
+                m.unit,
+                f"{m.by * m.std:+.2g}",
+                f"{m.by:+.2f}",
+            ]
+        )
         for m in (diagnosis.evidence.moved if diagnosis.evidence else ())
     ]
     return Table(heads, rows)

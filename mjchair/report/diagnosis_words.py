@@ -15,7 +15,7 @@ from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.explain.probability import of_effects
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.process import Part
-from mjchair.diagnosis.next_experiment.wording import measured, plain
+from mjchair.diagnosis.next_experiment.wording import MEASURED, measured, plain
 from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.result import (
     Diagnosis,
@@ -34,6 +34,7 @@ CLEAR = 0.5  # of what shakes the chair forward: a force once a turn of this siz
 NOTABLE = 1.5  # times the noise: where a correction leaves more, what can explain it is said
 A_GAP = 0.8  # of what a correction leaves: where no more than this is a gap, the rest is explained
 FAINT = 1e-3  # of the loudest: less of what shakes a chair is nothing
+MUCH = 0.15  # share by which a fit moved what a person can measure, worth a word beside a name
 UNSURE = 0.005  # probabilities below this are not named
 
 
@@ -299,8 +300,26 @@ def next_step(diagnosis: Diagnosis) -> str:
                 "These data decide what is named. Use the corrected chair (model.xml), but look "
                 f"for what is left{below}."
             )
-        return "These data decide; use the corrected chair (model.xml)."
+        return f"These data decide; use the corrected chair (model.xml).{_moved_much(diagnosis)}"
     return first_sentence(diagnosis.next_experiment)
+
+
+def _moved_much(diagnosis: Diagnosis) -> str:
+    """A sentence on what the corrected chair has besides that a person should measure first."""
+    moved = diagnosis.evidence.moved if diagnosis.evidence is not None else ()
+    much = [m for m in moved if m.unit == "1" and m.name in MEASURED and abs(m.by * m.std) >= MUCH]
+    if not much:
+        return ""
+    said = " and ".join(f"{measured(m.name)} by {100.0 * m.by * m.std:+.0f} %" for m in much)
+    return f" These runs moved {said} besides, which they tell only roughly: measure it first."
+
+
+def other_runs(diagnosis: Diagnosis) -> str:
+    """On what an effect is tried that was not fitted: other runs, or parts of the only one."""
+    trials = diagnosis.evidence.trials if diagnosis.evidence is not None else ()
+    if sum(not t.held_out for t in trials) == 1:
+        return "parts of the run that it was not fitted to"
+    return "runs that it was not fitted to"
 
 
 def known_drivers(diagnosis: Diagnosis) -> list[MissingForce]:
@@ -365,7 +384,7 @@ def choice_words(diagnosis: Diagnosis) -> str:
         return "None is named, since there is no gap to explain."
     if diagnosis.verdict == Verdict.NAMED:
         return (
-            "It is significant, it holds on runs that it was not fitted to, it closes most of the "
+            f"It is significant, it holds on {other_runs(diagnosis)}, it closes most of the "
             "gap, and its probability is 95 % or more."
         )
     if diagnosis.verdict == Verdict.AMBIGUOUS:
@@ -374,8 +393,8 @@ def choice_words(diagnosis: Diagnosis) -> str:
             "parameter is not clearly away from nothing."
         )
     rules = (
-        f"None is named. An answer closes at least {PARTLY:.0%} of the gap and holds on runs that "
-        "it was not fitted to; no effect, nor two or three together, does both. "
+        f"None is named. An answer closes at least {PARTLY:.0%} of the gap and holds on "
+        f"{other_runs(diagnosis)}; no effect, nor two or three together, does both. "
     )
     return rules + nearest_words(diagnosis) + "Section 2 is what is known of the force."
 
