@@ -58,6 +58,9 @@ def read_columns(
     return names, numbers(rows, names, wanted)
 
 
+MARKS = "a comma, a semicolon or a tab parts the cells of a row"
+
+
 @dataclass(frozen=True)
 class Rows:
     """The rows of a table, without its header.
@@ -131,9 +134,14 @@ def _strings(rows: Rows, count: int) -> list[Any]:
         ) from None
     if wrong:
         row = wrong[0]
+        why = (
+            "is the file cut short?"
+            if count > 1
+            else f"{MARKS}, and nothing stands before the header"
+        )
         raise MjchairError(
             f"{rows.source}: row {row.number + rows.before} has {row.actual_columns} cells; "
-            f"the {'header' if rows.before else 'first row'} has {count}; is the file cut short?"
+            f"the {'header' if rows.before else 'first row'} has {count}; {why}"
         )
     return [column.combine_chunks() for column in table.columns]
 
@@ -176,4 +184,5 @@ def _number(cell: str | None, where: str) -> float | None:
     try:
         return float(cell)
     except ValueError:
-        raise MjchairError(f"{where}: {cell[:30]!r} is not a number") from None
+        several = f"; {MARKS}" if len(cell.split()) > 1 else ""
+        raise MjchairError(f"{where}: {cell[:30]!r} is not a number{several}") from None

@@ -122,6 +122,8 @@ def test_inputs_are_frozen():
         ("time,left_wheel\n0,\n1,\n", "left_wheel has no samples"),
         ("time,left_wheel\n0,x\n", "row 2, column 'left_wheel': 'x' is not a number"),
         ("time,left_wheel\n0,1,2\n", "row 2 has 3 cells; the header has 2"),
+        ("# me\ntime,left_wheel\n0,1\n", "the header has 1; a comma, a semicolon or a tab"),
+        ("time left_wheel\n0 1\n", "a comma, a semicolon or a tab parts the cells"),
         ("t,left_wheel\n0,1\n", "the first column is 't'; it must be time"),
         ("time,left_wheel,left_wheel\n0,1,2\n", "'left_wheel' is there twice"),
         ("time,left_whel\n0,1\n", "unknown channel 'left_whel'; did you mean 'left_wheel'?"),
