@@ -80,7 +80,8 @@ def test_pac89_is_mirrored_as_adams_tire_does():
 
 @pytest.mark.parametrize("family", ["mf52", "mf61", "pac89"])
 def test_a_symmetric_tire_has_neither_ply_steer_nor_conicity(family):
-    tire = whole(family, side="symmetric")
+    assert whole(family, side="symmetric").coefficients == whole(family).coefficients
+    tire = whole(family, side="symmetric").on("left")
     straight = tire.forces(tire.nominal_load, 0.1, 0.0)
     assert straight.Fy == 0.0
     assert straight.Mz == 0.0

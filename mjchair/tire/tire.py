@@ -60,8 +60,8 @@ class Tire:
       source: where the numbers come from.
       side: "left" or "right", the side of the vehicle on which the coefficients hold: on the other
         side the tire is its mirror image (`on`). "symmetric": no ply steer, no conicity and no
-        other difference between left and right, so the coefficients of them are left out. "": not
-        said; the tire is the same on both sides.
+        other difference between left and right is meant, so on a vehicle (`on`) it has none. "":
+        not said; the tire is the same on both sides.
       unused: what its file has and this project does not use, as "SECTION.KEY": text.
       The others: see their metadata (unit, range, text), or `mjchair models`.
 
@@ -123,13 +123,7 @@ class Tire:
         object.__setattr__(
             self,
             "coefficients",
-            MappingProxyType(
-                {
-                    k: float(v)
-                    for k, v in self.coefficients.items()
-                    if self.side != "symmetric" or k not in family.odd
-                }
-            ),
+            MappingProxyType({k: float(v) for k, v in self.coefficients.items()}),
         )
         if self.coefficients.get("UNLOADED_RADIUS"):
             object.__setattr__(self, "radius", self.coefficients["UNLOADED_RADIUS"])
@@ -211,8 +205,12 @@ class Tire:
         """The tire as it is on the `side` of a vehicle, "left" or "right".
 
         It is the mirror image of itself where its coefficients hold for the other side, and as it
-        is on a wheel of neither.
+        is on a wheel of neither. A symmetric one is without what makes it unlike its mirror image.
         """
+        odd = FAMILIES[self.family].odd
+        if self.side == "symmetric" and any(self.coefficients.get(k) for k in odd):
+            even = {k: v for k, v in self.coefficients.items() if k not in odd}
+            return replace(self, coefficients=even)
         if self.side not in ("left", "right") or side not in ("left", "right"):
             return self
         if self.side == side:
