@@ -502,7 +502,40 @@ BAD = {
     "no mapping": (["{good}", "--mapping", "none.toml"], "cannot read none.toml"),
     "wrong plan": (["{plan}"], "unknown key 'sides'; did you mean 'side'?"),
     "both left": (["{twice}"], "are both of the left wheel"),
+    "one row": (["{row}"], "run.csv is not used: 1 row of numbers; a motion takes at least 3"),
+    "torque in N mm": (["{milli}"], "run.csv: left_wheel looks like N mm: it reaches "),
 }
+
+
+def table_of(torque=12.0, code=None, header="time,left_wheel,left_wheel_speed"):
+    """A table at 100 Hz of strokes (N m); with a code for missing samples of the wheel's speed."""
+    time = np.arange(0.0, 8.0, 0.01)
+    drive = torque * np.maximum(np.sin(2.0 * np.pi * time), 0.0)
+    speed = 2.0 + 0.1 * time - 0.3 * np.cos(2.0 * np.pi * time)
+    if code is not None:
+        speed[300:340] = code
+    rows = zip(time, drive, speed, strict=True)
+    return "\n".join([header, *(f"{t:.2f},{d:.4f},{v:.5f}" for t, d, v in rows)]) + "\n"
+
+
+def test_a_file_with_one_row_is_named_and_the_others_are_gathered(tmp_path):
+    (tmp_path / "push_left.csv").write_bytes(samples.propulsion().read_bytes())
+    (tmp_path / "run.csv").write_text("time,left_wheel,left_wheel_speed\n0,0.1,2\n")
+    gathered = gather(tmp_path)
+    assert [trial.name for trial in gathered.trials] == ["push"]
+    assert "run.csv is not used: 1 row of numbers" in gathered.unused[0]
+    assert gathered.unused[0] in gathered.files["gather.log"]
+
+
+def test_a_code_for_missing_samples_is_no_speed(tmp_path):
+    (tmp_path / "run.csv").write_text(table_of(code=-9999.0))
+    gathered = gather(tmp_path)
+    speed = gathered.trials[0].columns["left_wheel_speed"]
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(speed)), np.arange(300, 340))
+    said = [line for line in gathered.notes if "run.csv" in line]
+    assert said == [
+        "run.csv: left_wheel_speed repeats -9999 from 3.00 to 3.39 s and then jumps; left out there"
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -519,6 +552,8 @@ def bad_folders(tmp_path_factory):
         "plan/run.csv": whole,
         "plan/gather.toml": '[files."run.csv"]\nsides = "left"\n',
         "round/run.csv": "Time (ms),left_wheel_speed (rpm)\n0,0\n10,1\n20,2\n",
+        "row/run.csv": "time,left_wheel,left_wheel_speed\n0,0.1,2\n",
+        "milli/run.csv": table_of(torque=12e3),
         "twice/a_left.csv": whole,
         "twice/left_a.csv": whole.replace("0.30", "0.31"),
     }

@@ -7,9 +7,9 @@ import pytest
 
 import mjchair
 from mjchair.cli import main
-from mjchair.errors import MjchairError
+from mjchair.errors import MjchairError, MjchairNote
 from mjchair.measurement import samples
-from mjchair.measurement.outcomes import UNITS, of_recording, outcomes, read_rim
+from mjchair.measurement.outcomes import UNITS, Outcomes, of_recording, outcomes, read_rim
 
 TOLERANCE = {"rtol": 1e-6, "atol": 1e-6}
 
@@ -125,6 +125,58 @@ def test_the_command_prints_and_writes_a_row_a_stroke(tmp_path, capsys):
     rows = out.read_text().splitlines()
     assert len(rows) == 9
     assert rows[0].startswith("push [1],start [s],push_time [s]")
+
+
+def table_with(simulated, path, change):
+    """The table of a run at `path`, after `change` of its rows (n, columns) by name -> column."""
+    simulated.to_csv(path)
+    header, *rows = (line.split(",") for line in path.read_text().splitlines())
+    change(rows, {name: k for k, name in enumerate(header)})
+    path.write_text("\n".join(",".join(row) for row in [header, *rows]) + "\n")
+    return path
+
+
+def test_strokes_in_which_the_wheel_is_not_seen_have_no_speed_and_the_others_stay(
+    simulated, tmp_path
+):
+    whole = outcomes(of_recording(simulated))
+    begin = whole["start"][1] + 0.15
+
+    def change(rows, column):
+        for row in rows:
+            if begin < float(row[column["time"]]) < begin + 0.4:
+                row[column["left_wheel_angle"]] = row[column["left_wheel_speed"]] = "-9999"
+
+    path = table_with(simulated, tmp_path / "run.csv", change)
+    with pytest.warns(MjchairNote, match="left_wheel_angle repeats -9999 from"):
+        table = outcomes(read_rim(path))
+    for name in ("mean_power", "work", "contact_angle", "mean_speed", "peak_speed_at"):
+        assert np.isnan(table[name][1])
+        assert table[name][0] == pytest.approx(whole[name][0], rel=5e-3, abs=0.02)
+    np.testing.assert_allclose(table["peak_moment"], whole["peak_moment"], rtol=5e-3)
+
+
+def test_large_numbers_stay_apart():
+    columns = {name: np.array([-1.5e6, 2.5e7]) for name in UNITS}
+    for line in Outcomes(columns, "wheel").text().splitlines()[2:]:
+        assert line[22:].split() == ["11750000.000", "18738329.701", "-1500000.000", "25000000.000"]
+
+
+def test_a_table_of_one_row_and_a_torque_in_n_mm_get_one_line(simulated, tmp_path, capsys):
+    row = table_with(
+        simulated, tmp_path / "row.csv", lambda rows, _: rows.__delitem__(slice(1, None))
+    )
+
+    def scale(rows, column):
+        for row in rows:
+            row[column["left_wheel"]] = str(1e3 * float(row[column["left_wheel"]]))
+
+    milli = table_with(simulated, tmp_path / "milli.csv", scale)
+    for path, line in ((row, "row.csv: 1 row of numbers"), (milli, "left_wheel looks like N mm")):
+        assert main(["outcomes", str(path)]) == 2
+        said = capsys.readouterr().err
+        assert line in said.splitlines()[-1]
+        assert "Warning" not in said
 
 
 @pytest.mark.parametrize(

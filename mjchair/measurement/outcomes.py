@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from mjchair.errors import MjchairError, nearest, note
 from mjchair.measurement.smartwheel import PushRim
+from mjchair.measurement.torque import check_torques
 from mjchair.measurement.trial import Trial
 from mjchair.simulation.recording import Recording
 from mjchair.simulation.table import frozen
@@ -31,6 +32,7 @@ Array = NDArray[np.float64]
 
 RISES, FALLS, PEAK = 5.0, 2.0, 25.0  # N: a push begins, ends, and must reach
 SHORTEST = 0.1  # s, of a push and of a recovery
+GAP = 5.0  # times the usual step, and SHORTEST, beyond which a wheel is not seen between samples
 RIM = 0.27  # m, radius of a push rim on a 24-inch wheel: 0.26-0.28, assumption
 UNITS = {
     "push": "1",
@@ -71,7 +73,8 @@ class Rim:
     """What one driven wheel did: all arrays (n,), forward positive.
 
     Attributes:
-      time: s. angle: rad. speed: rad/s. moment: of the hand about the axle, N m.
+      time: s. angle: rad. speed: rad/s, NaN where the wheel is not seen. moment: of the hand about
+        the axle, N m.
       force: the hand's total force, N; None: not measured. name: of the wheel.
     """
 
@@ -106,7 +109,7 @@ class Outcomes:
 
     Attributes:
       columns: name -> (strokes,), in the units of UNITS; NaN where the recording ends within the
-        stroke. wheel: its name.
+        stroke, and where the wheel is not seen in a part of it. wheel: its name.
     """
 
     columns: dict[str, Array]
@@ -148,14 +151,17 @@ class Outcomes:
     def text(self) -> str:
         """The table for people: a row an outcome, with mean, spread and range over strokes."""
         out = [f"{self.wheel}: {len(self)} strokes"]
-        out.append(f"{'outcome':<15}{'unit':<7}{'mean':>9}{'sd':>9}{'least':>9}{'most':>9}")
+        rows = []
         for name, values in self.columns.items():
             there = values[np.isfinite(values)]
             if name in ("push", "start") or not there.size:
                 continue
             spread = float(there.std(ddof=1)) if there.size > 1 else 0.0
             numbers = (there.mean(), spread, there.min(), there.max())
-            out.append(f"{name:<15}{UNITS[name]:<7}" + "".join(f"{v:9.3f}" for v in numbers))
+            rows.append((name, UNITS[name], [f"{v:.3f}" for v in numbers]))
+        wide = max([8, *(len(cell) for *_, cells in rows for cell in cells)]) + 1
+        for name, unit, cells in [("outcome", "unit", ["mean", "sd", "least", "most"]), *rows]:
+            out.append(f"{name:<15}{unit:<7}" + "".join(f"{cell:>{wide}}" for cell in cells))
         return "\n".join(out)
 
 
@@ -212,6 +218,7 @@ def _row(rim: Rim, number: int, stroke: Stroke) -> dict[str, float]:
     push = slice(begin, release + 1)
     whole = slice(begin, end + 1) if end >= 0 else None
     moment, power = rim.moment[push], rim.moment[push] * rim.speed[push]
+    turned = rim.angle[release] - rim.angle[begin] if np.isfinite(power).all() else np.nan
     row = {
         "push": float(number),
         "start": rim.time[begin],
@@ -221,13 +228,15 @@ def _row(rim: Rim, number: int, stroke: Stroke) -> dict[str, float]:
         "peak_power": power.max(),
         "mean_power": power.mean(),
         "work": np.trapezoid(power, rim.time[push]),
-        "contact_angle": np.degrees(rim.angle[release] - rim.angle[begin]),
+        "contact_angle": np.degrees(turned),
     }
     names = ("recovery_time", "cadence", "mean_speed", "speed_change", "peak_speed_at")
     if whole is None:
         return row | dict.fromkeys(names, np.nan)
     speed, lasts = rim.speed[whole], rim.time[end] - rim.time[begin]
     fastest = (rim.time[begin + int(np.argmax(speed))] - rim.time[begin]) / lasts
+    if np.isnan(speed).any():
+        fastest = np.nan
     values = (rim.time[end] - rim.time[release], 60.0 / lasts, speed.mean(), np.ptp(speed), fastest)
     return row | dict(zip(names, values, strict=True))
 
@@ -254,20 +263,34 @@ def of_trial(trial: Trial, wheel: str = "left_wheel") -> Rim:
     """The rim of a measured run that has a wheel's torque, and its angle or speed.
 
     Raises:
-      MjchairError: it has not.
+      MjchairError: it has not, or its torque is in N mm.
     """
     if trial.inputs is None or wheel not in trial.inputs.controls:
         known = trial.inputs.controls if trial.inputs is not None else ()
         raise MjchairError(f"{trial.name}: no torque of {wheel}" + nearest(wheel, known))
+    check_torques({wheel: trial.inputs.controls[wheel]}, trial.name)
     time, moment = trial.inputs.samples(wheel)
     if f"{wheel}_angle" in trial.channels:
-        angle = np.interp(time, *trial.samples(f"{wheel}_angle"))
-        return Rim(time, angle, _speed(time, angle), moment, None, wheel)
-    if f"{wheel}_speed" in trial.channels:
-        speed = np.interp(time, *trial.samples(f"{wheel}_speed"))
-        steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(time)
-        return Rim(time, np.r_[0.0, np.cumsum(steps)], speed, moment, None, wheel)
-    raise MjchairError(f"{trial.name}: neither {wheel}_angle nor {wheel}_speed is there")
+        seen, turned = trial.samples(f"{wheel}_angle")
+        angle = np.interp(time, seen, turned)
+        speed = _speed(time, angle)
+    elif f"{wheel}_speed" in trial.channels:
+        seen, speeds = trial.samples(f"{wheel}_speed")
+        speed = np.interp(time, seen, speeds)
+        angle = np.r_[0.0, np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))]
+    else:
+        raise MjchairError(f"{trial.name}: neither {wheel}_angle nor {wheel}_speed is there")
+    return Rim(time, angle, np.where(_unseen(time, seen), np.nan, speed), moment, None, wheel)
+
+
+def _unseen(time: Array, seen: Array) -> NDArray[np.bool_]:
+    """Which times (n,), s, lie in a gap of the times at which a wheel is seen, (m,), s."""
+    steps = np.diff(seen)
+    if not steps.size:
+        return np.ones(time.size, bool)
+    wide = np.flatnonzero(steps > max(SHORTEST, GAP * float(np.median(steps))))
+    at = np.searchsorted(seen, time, side="right") - 1
+    return np.isin(at, wide) & (time > seen[at])
 
 
 def _speed(time: Array, angle: Array) -> Array:

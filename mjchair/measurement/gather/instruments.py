@@ -21,6 +21,7 @@ from mjchair.measurement.gather.sources import Source
 from mjchair.measurement.notes import Detail, about
 from mjchair.measurement.sensors import rolls, sensor
 from mjchair.measurement.smartwheel import Orientation, PushRim
+from mjchair.measurement.torque import check_torques
 from mjchair.rider.anatomy import JOINT_NAMES
 from mjchair.simulation.inputs import OTHER_COLUMNS
 from mjchair.simulation.table import Table, check_units, read_table
@@ -331,10 +332,11 @@ def _table(source: Source) -> Instrument:
         if RIDER_COLUMNS & set(table.columns) and not _of_wheel(table):
             return _rider(source, table)
         time, columns, trigger = np.asarray(table.time), dict(table.columns), None
+    wheels: tuple[str, ...] = ("left_wheel", "right_wheel")
     columns, notes = table_wheels.put_right(time, columns, source.path.name, export is None)
     notes = [*export.notes, *notes] if export is not None else notes
-    wheels: tuple[str, ...] = ("left_wheel", "right_wheel")
     torque = {name: columns.pop(name) for name in wheels if name in columns}
+    check_torques(torque, source.path.name)
     courses = {one: table_wheels.motion(time, columns, one) for one in ("left", "right")}
     side = next((one for one, speed in courses.items() if speed is not None), "")
     return Instrument(

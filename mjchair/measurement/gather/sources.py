@@ -28,6 +28,7 @@ from msgspec import Struct
 from mjchair.errors import MjchairError, nearest
 from mjchair.measurement.delimited import Delimited, read_delimited
 from mjchair.measurement.exports import Format, matching, read_formats
+from mjchair.measurement.table_wheels import FEWEST, few_rows
 from mjchair.toml_file import read_toml
 
 PLAN = "gather.toml"
@@ -142,7 +143,7 @@ def find_sources(folder: Path, mappings: Sequence[Path] = ()) -> Found:
     _check_plan(plan, folder)
     if not sources:
         lines = "; ".join(unused[:3]) or f"there is none that ends in {', '.join(SUFFIXES)}"
-        raise MjchairError(f"{folder}: no file of a known kind: {lines}")
+        raise MjchairError(f"{folder}: no file of a known kind that can be used: {lines}")
     sources = _without_tags(sources, plan, folder)
     return Found(tuple(_one_trial(sources, plan)), tuple(unused))
 
@@ -201,6 +202,8 @@ def _kind(
     if form is not None:
         return str(form.mapping.kind), form, file, ""
     if file.header and file.header[0].lower().split("[")[0].strip() == "time":
+        if len(file.values) < FEWEST:
+            return "", None, None, few_rows(len(file.values))
         return "table", None, file, ""
     if file.values.shape[1] in (24, 25):
         return "smartwheel", None, file, ""
