@@ -488,6 +488,10 @@ BAD = {
     "cut short": (["{cut}"], "is the file cut short"),
     "text inside": (["{text}"], "is not a number"),
     "only a baseline": (["{rest}"], "a recording of an untouched rim, and none of the rim in use"),
+    "an untouched rim by its name": (["{rest}"], "take 'baseline' out of its name if it is one"),
+    "one word for it": (["{bare}"], "take 'bare' out of its name if it is one"),
+    "a run that is empty": (["{void}"], "; push_left.csv is not used: it is empty"),
+    "one file as two sides": (["{sides}"], "a_right.csv holds the samples of a_left.csv again"),
     "heavy rider": (["{good}", "--rider-mass", "95", "--mass", "92"], "the rider weighs 95 kg"),
     "radius in mm": (["{good}", "--wheel-radius", "300"], "is it in mm?"),
     "light together": (
@@ -538,6 +542,66 @@ def test_a_code_for_missing_samples_is_no_speed(tmp_path):
     ]
 
 
+def propulsion_with(path, moment):
+    """The SmartWheel excerpt at `path` with Mz (N m), column 24, as `moment` makes it."""
+    rows = [line.split(",") for line in samples.propulsion().read_text().splitlines()]
+    for row in rows:
+        row[23] = f"{moment(float(row[23])):.2f}"
+    path.write_text("\n".join(",".join(row) for row in rows) + "\n")
+    return path
+
+
+def test_a_moment_that_was_not_recorded_is_said_and_is_no_torque(tmp_path, capsys):
+    path = propulsion_with(tmp_path / "push_left.csv", lambda moment: 0.0)
+    gathered = gather(tmp_path)
+    said = "\n".join(gathered.notes)
+    assert "push_left.csv: Mz is 0.00 N m in every sample, while F" in said
+    assert not gathered.trials[0].instruments[0].torque
+    assert main(["outcomes", str(path)]) == 2
+    assert "Mz is 0.00 N m in every sample" in capsys.readouterr().err
+
+
+def test_a_channel_at_its_end_is_said_and_a_whole_one_is_not(tmp_path, capsys):
+    propulsion_with(tmp_path / "push_left.csv", lambda moment: min(moment, 6.0))
+    ends = [line for line in gather(tmp_path).notes if "sensor at its end" in line]
+    values = read_delimited(samples.propulsion()).values[:, 23]
+    assert ends == [
+        f"push_left.csv: Mz is 6.00 N m in {np.mean(values >= 6.0):.0%} of the samples and never "
+        "beyond: a sensor at its end tells less than was there"
+    ]
+    assert main(["outcomes", str(tmp_path / "push_left.csv")]) == 0
+    assert ends[0] in capsys.readouterr().err
+    propulsion_with(tmp_path / "push_left.csv", lambda moment: moment)
+    assert "sensor at its end" not in "\n".join(gather(tmp_path).notes)
+
+
+def test_a_baseline_of_the_other_rim_is_listed(tmp_path):
+    (tmp_path / "push_left.csv").write_bytes(samples.propulsion().read_bytes())
+    rest = samples.baseline().read_bytes()
+    (tmp_path / "baseline_right.csv").write_bytes(rest)
+    gathered = gather(tmp_path)
+    assert gathered.unused == (
+        "baseline_right.csv is not used: it is of the right rim, and no recording of that rim in "
+        "use is there",
+    )
+    assert gathered.unused[0] in gathered.files["gather.log"]
+    (tmp_path / "baseline_right.csv").rename(tmp_path / "baseline_left.csv")
+    assert not gather(tmp_path).unused
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("swl_push.csv", "'swl' in its name tells the side"),
+        ("push.csv", "taken as left, say it in gather.toml"),
+    ],
+)
+def test_a_side_that_no_plain_word_tells_is_said(name, said, tmp_path, capsys):
+    (tmp_path / name).write_bytes(samples.propulsion().read_bytes())
+    assert main(["gather", str(tmp_path), "--out", str(tmp_path / "study")]) == 0
+    assert said in capsys.readouterr().out
+
+
 @pytest.fixture(scope="module")
 def bad_folders(tmp_path_factory):
     place = tmp_path_factory.mktemp("bad")
@@ -552,6 +616,11 @@ def bad_folders(tmp_path_factory):
         "plan/run.csv": whole,
         "plan/gather.toml": '[files."run.csv"]\nsides = "left"\n',
         "round/run.csv": "Time (ms),left_wheel_speed (rpm)\n0,0\n10,1\n20,2\n",
+        "bare/bare_rim.csv": whole,
+        "void/baseline.csv": whole,
+        "void/push_left.csv": "",
+        "sides/a_left.csv": whole,
+        "sides/a_right.csv": whole,
         "row/run.csv": "time,left_wheel,left_wheel_speed\n0,0.1,2\n",
         "milli/run.csv": table_of(torque=12e3),
         "twice/a_left.csv": whole,

@@ -322,7 +322,12 @@ def read_rim(
       MjchairError: it is none of these, or as its reader does.
     """
     from mjchair.measurement.baseline import without_baseline
-    from mjchair.measurement.smartwheel import oriented, read_smartwheel
+    from mjchair.measurement.smartwheel import (
+        at_its_end,
+        oriented,
+        read_smartwheel,
+        without_moment,
+    )
     from mjchair.simulation.recording import load_recording
 
     path = Path(path)
@@ -331,7 +336,12 @@ def read_rim(
     if _has_time(path):
         return of_trial(_trial(path), wheel)
     still = read_smartwheel(baseline) if baseline is not None else None
-    run = oriented(without_baseline(read_smartwheel(path), still))
+    raw = read_smartwheel(path)
+    if without_moment(raw):
+        raise MjchairError(f"{path.name}: {without_moment(raw)}")
+    for line in at_its_end(raw):
+        note(line)
+    run = oriented(without_baseline(raw, still))
     return of_push_rim(run, path.stem)
 
 

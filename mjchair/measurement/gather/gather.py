@@ -18,6 +18,7 @@ from mjchair.measurement.gather.coasts import coasts, pushes
 from mjchair.measurement.gather.instruments import (
     RIDER_COLUMNS,
     ReadsMarkers,
+    idle_baselines,
     read_instruments,
 )
 from mjchair.measurement.gather.join import GatheredTrial, heading_at, join
@@ -79,10 +80,12 @@ def gather(
     found = find_sources(folder, mappings)
     sources = _with_offsets(found.sources, offsets or {})
     instruments = read_instruments(sources, of_markers)
+    unused = (*found.unused, *idle_baselines(sources, instruments))
     names = list(dict.fromkeys(one.source.trial for one in instruments))
     if not names:
         raise MjchairError(
             f"{folder}: no wheel, no sensor on the frame and no markers among its files"
+            + "".join(f"; {line}" for line in unused[:3])
         )
     mine = {name: [one for one in instruments if one.source.trial == name] for name in names}
     joined = [join(name, mine[name]) for name in names]
@@ -115,9 +118,9 @@ def gather(
     text = study_text(trials, noise, known, radius, shared)
     files = {"study.toml": text} | {f"{t.name}.csv": table_text(t) for t in trials}
     summary = _summary(trials, agreed)
-    files[LOG] = "\n".join((*summary, *notes, *found.unused)) + "\n"
+    files[LOG] = "\n".join((*summary, *notes, *unused)) + "\n"
     asked = known.missing(radius)
-    return Gathered(files, tuple(trials), noise, tuple(notes), found.unused, asked, summary)
+    return Gathered(files, tuple(trials), noise, tuple(notes), unused, asked, summary)
 
 
 def _summary(trials: Sequence[GatheredTrial], agreed: Agreed) -> tuple[str, ...]:
