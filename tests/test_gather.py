@@ -691,6 +691,27 @@ def test_markers_alone_are_a_study_of_the_chairs_speed(tmp_path):
     assert any("free-rolling parts" in note for note in gathered.notes)
 
 
+@pytest.mark.parametrize(
+    ("floor", "said"),
+    [
+        (None, r"trial 'run': the markers of the chair in run_rider.csv stay within 0.02 m"),
+        ("rollers", "on rollers the chair stays in place, and run_rider.csv does not tell how"),
+    ],
+)
+def test_a_chair_that_rocks_in_place_is_no_push(floor, said, tmp_path):
+    """On rollers: a rider's table alone, whose markers go to and fro with the strokes."""
+    time = np.arange(0.0, 12.0, 0.01)
+    rows = np.column_stack([time, 0.03 * np.sin(6.0 * time), 0.05 * np.sin(6.0 * time)])
+    header = "time,rider_motion,chair_speed"
+    np.savetxt(tmp_path / "run_rider.csv", rows, "%.6g", ",", header=header, comments="")
+    with pytest.raises(MjchairError, match=said):
+        gather(tmp_path, Known(floor=floor))
+    rows[:, 2] += 0.5
+    np.savetxt(tmp_path / "run_rider.csv", rows, "%.6g", ",", header=header, comments="")
+    if floor is None:
+        assert gather(tmp_path, Known(floor=floor)).trials
+
+
 def test_a_marker_file_whose_chair_stands_cannot_be_put_on_a_clock(run, tmp_path):
     lab.smartwheel(tmp_path / "push1_left.csv", run, "left")
     own = np.arange(0.0, 20.0, 0.01)

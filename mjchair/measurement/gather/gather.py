@@ -17,6 +17,7 @@ from mjchair.errors import MjchairError, nearest, note
 from mjchair.measurement.gather.coasts import coasts, pushes
 from mjchair.measurement.gather.instruments import (
     RIDER_COLUMNS,
+    Instrument,
     ReadsMarkers,
     idle_baselines,
     read_instruments,
@@ -27,6 +28,7 @@ from mjchair.measurement.gather.sources import LOG, Source, find_sources
 from mjchair.measurement.gather.study_file import study_text
 from mjchair.measurement.gather.together import Agreed, label_of, started_together
 from mjchair.measurement.gather.without_torque import estimated
+from mjchair.measurement.sensors import rolls
 
 Array = NDArray[np.float64]
 
@@ -35,6 +37,7 @@ RESTS = 0.05  # rad/s of a wheel, below which the chair stands
 STEP = 2.0 * np.pi / 4096  # rad, of the encoders in use
 EVEN, FEW = 0.2, 6.4  # of a step, within which readings come in whole steps, of so many at most
 MANY = 3  # pushes that make a run a pushed one; one or two set a coast going
+TRAVELS = 0.5  # m, below which a chair on a floor rocks and goes nowhere; assumption
 RUNS_OFF_FLOOR = ("rollers",)  # floors on which the chair itself does not move
 
 
@@ -95,7 +98,7 @@ def gather(
     for name, trial in zip(names, joined, strict=True):
         same = join(name, mine[name], agreed[name]) if name in agreed else trial
         same = _for_floor(same, known)
-        why = _pushed_unseen(same)
+        why = _goes_nowhere(same, known) or _pushed_unseen(same)
         if why:
             left_out.append(why)
         else:
@@ -201,6 +204,35 @@ def _usable(trial: GatheredTrial, known: Known) -> list[GatheredTrial]:
         _cut(trial, f"{trial.name}_coast{k}", (a - trial.begin, b - trial.begin), said)
         for k, (a, b) in enumerate(parts, start=1)
     ]
+
+
+def _goes_nowhere(trial: GatheredTrial, known: Known) -> str:
+    """Why a trial cannot be used in which nothing shows how far the chair goes; or ""."""
+    names = ", ".join(one.name for one in trial.instruments)
+    if known.floor in RUNS_OFF_FLOOR and not any(rolls(name) for name in trial.columns):
+        return (
+            f"trial {trial.name!r}: on rollers the chair stays in place, and {names} does not tell "
+            "how a wheel turns; add a wheel's file"
+        )
+    seen = [one for one in trial.instruments if one.ground is not None]
+    if trial.driven or not seen or any(rolls(name) for name in trial.columns):
+        return ""
+    way = max(_way(one) for one in seen)
+    if way >= TRAVELS:
+        return ""
+    return (
+        f"trial {trial.name!r}: the markers of the chair in {names} stay within {way:.2f} m, so it "
+        "goes nowhere; on rollers markers show no travel: add a wheel's file"
+    )
+
+
+def _way(one: Instrument) -> float:
+    """How far apart two places of a chair are along its way, by its markers, m."""
+    assert one.ground is not None
+    there = np.isfinite(one.ground)
+    time, speed = one.time[there], one.ground[there]
+    gone = np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))
+    return float(np.ptp(np.r_[0.0, gone]))
 
 
 def _pushed_unseen(trial: GatheredTrial) -> str:
