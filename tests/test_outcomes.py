@@ -179,6 +179,18 @@ def test_a_table_of_one_row_and_a_torque_in_n_mm_get_one_line(simulated, tmp_pat
         assert "Warning" not in said
 
 
+def test_the_folder_of_the_table_is_made_or_refused_before_the_work(tmp_path, capsys):
+    out = tmp_path / "new" / "deep" / "outcomes.csv"
+    assert main(["outcomes", str(samples.propulsion()), "--out", str(out)]) == 0
+    assert out.is_file()
+    capsys.readouterr()
+    for command in (["outcomes", "nowhere.csv"], ["rider", "nowhere.c3d"]):
+        assert main([*command, "--out", str(out / "more" / "x.csv")]) == 2
+        assert f"{out} is a file, and must be a folder" in capsys.readouterr().err
+    assert main(["gather", "nowhere", "--out", str(out / "study")]) == 2
+    assert f"{out} is a file, and must be a folder" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
