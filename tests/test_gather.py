@@ -531,6 +531,23 @@ def test_a_file_with_one_row_is_named_and_the_others_are_gathered(tmp_path):
     assert gathered.unused[0] in gathered.files["gather.log"]
 
 
+def test_a_table_of_both_wheels_is_called_and_drawn_as_both(tmp_path):
+    from mjchair.report.gathered import gathered_figure
+
+    time = np.arange(0.0, 8.0, 0.01)
+    drive = 12.0 * np.maximum(np.sin(2.0 * np.pi * time), 0.0)
+    speed = 2.0 + 0.1 * time - 0.3 * np.cos(2.0 * np.pi * time)
+    rows = np.column_stack([time, drive, drive, speed, 1.1 * speed])
+    header = "time,left_wheel,right_wheel,left_wheel_speed,right_wheel_speed"
+    np.savetxt(tmp_path / "run.csv", rows, "%.6g", ",", header=header, comments="")
+    gathered = gather(tmp_path)
+    assert gathered.summary[0].endswith("left and right table")
+    lines = gathered_figure(gathered.trials).axes[0].get_lines()
+    assert [line.get_label() for line in lines] == ["left wheel, run.csv", "right wheel, run.csv"]
+    np.testing.assert_allclose(lines[1].get_ydata(), rows[:, 4], rtol=1e-5)
+    assert lines[0].get_color() != lines[1].get_color()
+
+
 def test_a_code_for_missing_samples_is_no_speed(tmp_path):
     (tmp_path / "run.csv").write_text(table_of(code=-9999.0))
     gathered = gather(tmp_path)

@@ -79,6 +79,20 @@ class Instrument:
     bare: str = ""
     notes: tuple[str, ...] = ()
 
+    @property
+    def sides(self) -> tuple[str, ...]:
+        """The sides of the wheels that it measured, of "left" and "right"."""
+        names = (*self.channels, *self.torque)
+        return tuple(s for s in OTHER if any(name.startswith(f"{s}_wheel") for name in names))
+
+    def courses(self) -> dict[str, Array]:
+        """Side -> the speed (n,) rad/s of each wheel that shows the motion; "": of markers."""
+        if self.speed is None:
+            return {}
+        found = {s: table_wheels.motion(self.time, self.channels, s) for s in self.sides}
+        told = {side: speed for side, speed in found.items() if speed is not None}
+        return told if len(told) > 1 else {self.side: self.speed}
+
 
 def read_instruments(
     sources: Sequence[Source], of_markers: ReadsMarkers | None = None
