@@ -9,6 +9,7 @@ import mjchair
 from mjchair.cli import main
 from mjchair.errors import MjchairError, MjchairNote
 from mjchair.measurement import samples
+from mjchair.measurement.gather.gather import gather
 from mjchair.measurement.outcomes import UNITS, Outcomes, of_recording, outcomes, read_rim
 
 TOLERANCE = {"rtol": 1e-6, "atol": 1e-6}
@@ -125,6 +126,35 @@ def test_the_command_prints_and_writes_a_row_a_stroke(tmp_path, capsys):
     rows = out.read_text().splitlines()
     assert len(rows) == 9
     assert rows[0].startswith("push [1],start [s],push_time [s]")
+
+
+def test_a_gathered_recording_has_the_outcomes_of_its_file(ours, tmp_path):
+    """The force that cuts pushes comes along; a table without it says what it does not count."""
+    (tmp_path / "push_left.csv").write_bytes(samples.propulsion().read_bytes())
+    (tmp_path / "baseline.csv").write_bytes(samples.baseline().read_bytes())
+    gathered = gather(tmp_path)
+    for name, text in gathered.files.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    table = outcomes(read_rim(tmp_path / "push.csv"))
+    for name in UNITS:
+        apart = 0.02 if name == "peak_speed_at" else 2e-3  # cells have seven digits
+        np.testing.assert_allclose(table[name], ours[name], rtol=2e-3, atol=apart, err_msg=name)
+    assert "not counted" not in table.text()
+    trial = mjchair.read_study(tmp_path).runs[0].trial
+    assert not trial.other and set(trial.channels) == {"left_wheel_angle"}
+    assert "left_wheel_force" not in gathered.noise
+
+    trial = gathered.trials[0]
+    rows = np.column_stack(
+        [trial.time, 0.8 * trial.columns["left_wheel"], trial.columns["left_wheel_angle"]]
+    )
+    header = "time,left_wheel,left_wheel_angle"
+    np.savetxt(tmp_path / "moment.csv", rows, "%.6f", ",", header=header, comments="")
+    fewer = outcomes(read_rim(tmp_path / "moment.csv"))
+    small = int(np.sum(0.8 * ours["peak_moment"] < 25.0 * 0.27))
+    assert 0 < small < len(ours)
+    assert (len(fewer), fewer.smaller) == (len(ours) - small, small)
+    assert f"{small} smaller pushes are not counted, below 6.8 N m" in fewer.text()
 
 
 def table_with(simulated, path, change):

@@ -7,7 +7,8 @@ power, work, contact angle, and how the speed changes within the stroke.
 Strokes are cut as Kinetics Toolkit's `cycles.detect_cycles` cuts them, with the thresholds of its
 push-rim tutorial: a push begins where the hand's force rises to 5 N and ends where it falls to 2 N;
 a phase of less than 0.1 s or a push whose peak is below 25 N is none. Without a force the moment
-stands for it, on a push rim of 0.27 m.
+stands for it, on a push rim of 0.27 m; a hand's total force is larger than its part along the rim,
+so that this counts fewer pushes.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.errors import MjchairError, nearest, note
-from mjchair.measurement.smartwheel import PushRim
+from mjchair.measurement.smartwheel import PushRim, hand_force
 from mjchair.measurement.torque import check_torques
 from mjchair.measurement.trial import Trial
 from mjchair.simulation.recording import Recording
@@ -110,10 +111,13 @@ class Outcomes:
     Attributes:
       columns: name -> (strokes,), in the units of UNITS; NaN where the recording ends within the
         stroke, and where the wheel is not seen in a part of it. wheel: its name.
+      smaller: pushes that are not counted, as they stay below what a push must reach. least: that.
     """
 
     columns: dict[str, Array]
     wheel: str
+    smaller: int = 0
+    least: str = ""
 
     def __len__(self) -> int:
         """Number of strokes."""
@@ -151,6 +155,11 @@ class Outcomes:
     def text(self) -> str:
         """The table for people: a row an outcome, with mean, spread and range over strokes."""
         out = [f"{self.wheel}: {len(self)} strokes"]
+        if self.smaller:
+            pushes = (
+                "1 smaller push is" if self.smaller == 1 else f"{self.smaller} smaller pushes are"
+            )
+            out[0] += f"; {pushes} not counted, below {self.least}"
         rows = []
         for name, values in self.columns.items():
             there = values[np.isfinite(values)]
@@ -171,19 +180,25 @@ def outcomes(rim: Rim) -> Outcomes:
     Raises:
       MjchairError: there is no stroke.
     """
-    found = strokes(rim)
+    every = _pushes(rim)
+    found = [stroke for stroke, counts in every if counts]
+    least = f"{PEAK:g} N" if rim.force is not None else f"{PEAK * RIM:.1f} N m"
     if not found:
-        what = f"{PEAK:g} N" if rim.force is not None else f"{PEAK * RIM:.1f} N m"
         raise MjchairError(
-            f"{rim.name}: no push of {SHORTEST:g} s that reaches {what}; there are no outcomes"
+            f"{rim.name}: no push of {SHORTEST:g} s that reaches {least}; there are no outcomes"
         )
     rows = [_row(rim, number, stroke) for number, stroke in enumerate(found, start=1)]
     columns = {name: frozen([row[name] for row in rows]) for name in UNITS}
-    return Outcomes(columns, rim.name)
+    return Outcomes(columns, rim.name, len(every) - len(found), least)
 
 
 def strokes(rim: Rim) -> list[Stroke]:
     """Where strokes begin and end; see the module's docstring."""
+    return [stroke for stroke, counts in _pushes(rim) if counts]
+
+
+def _pushes(rim: Rim) -> list[tuple[Stroke, bool]]:
+    """Every stroke that is long enough, and whether its push reaches what one must reach."""
     scale = 1.0 if rim.force is not None else RIM
     hand = rim.force if rim.force is not None else np.abs(rim.moment)
     events = _crossings(np.asarray(hand), RISES * scale, FALLS * scale)
@@ -194,8 +209,8 @@ def strokes(rim: Rim) -> list[Stroke]:
         push = rim.time[release] - rim.time[begin]
         recovery = rim.time[end] - rim.time[release] if end >= 0 else np.inf
         high = float(np.max(hand[begin : release + 1])) >= PEAK * scale
-        if push >= SHORTEST and recovery >= SHORTEST and high:
-            found.append(Stroke(begin, release, end))
+        if push >= SHORTEST and recovery >= SHORTEST:
+            found.append((Stroke(begin, release, end), high))
     return found
 
 
@@ -243,8 +258,7 @@ def _row(rim: Rim, number: int, stroke: Stroke) -> dict[str, float]:
 
 def of_push_rim(run: PushRim, name: str = "wheel") -> Rim:
     """The rim of a recording whose signs and baseline are put right."""
-    force = np.linalg.norm(run.forces[:, :3], axis=1)
-    return Rim(run.time, run.angle, run.speed, run.torque, force, name)
+    return Rim(run.time, run.angle, run.speed, run.torque, hand_force(run), name)
 
 
 def of_recording(recording: Recording, wheel: str = "left_wheel") -> Rim:
@@ -334,7 +348,7 @@ def read_rim(
     if path.suffix == ".npz":
         return of_recording(load_recording(path), wheel)
     if _has_time(path):
-        return of_trial(_trial(path), wheel)
+        return _of_table(path, wheel)
     still = read_smartwheel(baseline) if baseline is not None else None
     raw = read_smartwheel(path)
     if without_moment(raw):
@@ -356,7 +370,8 @@ def _has_time(path: Path) -> bool:
         raise MjchairError(f"cannot read {path}: {error.strerror}") from None
 
 
-def _trial(path: Path) -> Trial:
+def _of_table(path: Path, wheel: str) -> Rim:
+    """The rim of a table of a study, with the hand's force where the table has it."""
     from mjchair.measurement.table_wheels import put_right
     from mjchair.measurement.trial import trial_from_table
     from mjchair.model.spec import load_spec
@@ -367,4 +382,7 @@ def _trial(path: Path) -> Trial:
     for line in said:
         note(line)
     table = replace(table, columns=columns)
-    return trial_from_table(table, load_spec("manual").compile(), path.stem)
+    rim = of_trial(trial_from_table(table, load_spec("manual").compile(), path.stem), wheel)
+    if f"{wheel}_force" not in columns:
+        return rim
+    return replace(rim, force=np.interp(rim.time, *table.samples(f"{wheel}_force")))

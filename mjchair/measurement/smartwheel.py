@@ -275,6 +275,11 @@ def oriented(run: PushRim) -> PushRim:
     return replace(turned(run, signs), notes=(*run.notes, note))
 
 
+def hand_force(run: PushRim) -> Array:
+    """The hand's total force on the rim, (n,), N, of a recording without its baseline."""
+    return np.asarray(np.linalg.norm(run.forces[:, :3], axis=1))
+
+
 def push_inputs(run: PushRim) -> Inputs:
     """The measured moment as torque on both rear wheels.
 

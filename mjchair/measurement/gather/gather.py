@@ -29,6 +29,7 @@ from mjchair.measurement.gather.study_file import study_text
 from mjchair.measurement.gather.together import Agreed, label_of, started_together
 from mjchair.measurement.gather.without_torque import estimated
 from mjchair.measurement.sensors import rolls
+from mjchair.simulation.inputs import HAND_FORCES
 
 Array = NDArray[np.float64]
 
@@ -290,7 +291,7 @@ def _noise(trials: Sequence[GatheredTrial]) -> dict[str, float]:
             least[name] = max(least.get(name, 0.0), _tick(name, values) / np.sqrt(12.0))
         for begin, end in rests:
             for name, values in trial.columns.items():
-                if name in ("left_wheel", "right_wheel", *RIDER_COLUMNS):
+                if name in ("left_wheel", "right_wheel", *HAND_FORCES, *RIDER_COLUMNS):
                     continue
                 inside = (trial.time >= begin) & (trial.time <= end) & np.isfinite(values)
                 if inside.sum() > 10:

@@ -275,6 +275,7 @@ def _wheel(
         notes.append(f"{name}: rolls backwards on balance")
     # From the first roll to the last: at the start from rest a hand pushes while the wheel is slow.
     rolling = np.flatnonzero(np.abs(clean.speed) > ROLLING)
+    channels = {f"{side}_wheel_angle": np.where(clean.there, clean.angle, np.nan)}
     torque = {f"{side}_wheel": clean.torque}
     unmeasured = smartwheel.without_moment(run)
     if unmeasured:
@@ -283,11 +284,13 @@ def _wheel(
     elif rolling.size and free[rolling[0] : rolling[-1] + 1].mean() > COAST:
         torque = {}
         notes.append(Detail(f"{name}: no hand on the rim; a coast, its torque is left out"))
+    if torque:
+        channels[f"{side}_wheel_force"] = smartwheel.hand_force(clean)
     return Instrument(
         name=name,
         source=source,
         time=np.asarray(clean.time),
-        channels={f"{side}_wheel_angle": np.where(clean.there, clean.angle, np.nan)},
+        channels=channels,
         torque=torque,
         speed=clean.speed,
         side=side,
