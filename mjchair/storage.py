@@ -63,14 +63,37 @@ def check_new(path: str | os.PathLike[str], force: bool = False) -> Path:
       force: allow a file that is there already.
 
     Raises:
-      MjchairError: the path is a folder, or a file that is there while `force` is false.
+      MjchairError: the path is a folder, or a file that is there while `force` is false, or a place
+        where nothing can be made.
     """
     file = Path(path)
     if file.is_dir():
         raise MjchairError(f"{file} is a folder; give the name of a file, as {file / 'result'}")
     if file.exists() and not force:
         raise MjchairError(f"{file} is there already; choose another name, or give --force")
+    _check_place(file)
     return file
+
+
+def make_place(file: Path) -> None:
+    """Make the folder of a file that a command writes, with its parents.
+
+    Raises:
+      MjchairError: it cannot be made.
+    """
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise MjchairError(f"cannot make {file.parent}: {error.strerror}") from None
+
+
+def _check_place(path: Path) -> None:
+    """Raise MjchairError where neither a path nor the folders above it can be made."""
+    above = next(folder for folder in path.absolute().parents if folder.exists())
+    if not above.is_dir():
+        raise MjchairError(f"cannot write {path}: {above} is a file, and must be a folder")
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise MjchairError(f"cannot write {path}: {above} may not be written; give another folder")
 
 
 def check_vacant(path: str | os.PathLike[str], force: bool = False) -> Path:
@@ -81,7 +104,8 @@ def check_vacant(path: str | os.PathLike[str], force: bool = False) -> Path:
       force: allow a folder that already holds files.
 
     Raises:
-      MjchairError: the path is a file, or the folder holds files and `force` is false.
+      MjchairError: the path is a file, or the folder holds files and `force` is false, or it is in
+        a place where nothing can be made.
     """
     folder = Path(path)
     if folder.exists() and not folder.is_dir():
@@ -90,6 +114,8 @@ def check_vacant(path: str | os.PathLike[str], force: bool = False) -> Path:
         raise MjchairError(
             f"{folder} is not empty; choose another --out, or overwrite with --force"
         )
+    if not folder.is_dir():
+        _check_place(folder)
     return folder
 
 

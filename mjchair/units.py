@@ -39,6 +39,16 @@ UNITS: dict[str, tuple[str, float]] = {
     "%": ("1", 1e-2),
 }
 
+# what people write for a unit of UNITS
+WRITTEN = {
+    "°": "deg",
+    "°/s": "deg/s",
+    "deg/sec": "deg/s",
+    "N·m": "N m",
+    "N⋅m": "N m",
+    "N.m": "N m",
+}
+
 _WITH_UNIT = re.compile(r"^(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?$")
 _QUANTITY = re.compile(r"^(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>.*)$")
 
@@ -57,9 +67,14 @@ def split_header(text: str) -> tuple[str, str]:
     unit = match["unit"]
     if unit is None:
         return match["name"], ""
-    if unit.strip() not in UNITS:
+    if known(unit) not in UNITS:
         raise MjchairError(f"column {text!r}: unknown unit {unit!r}" + nearest(unit, UNITS))
-    return match["name"], unit.strip()
+    return match["name"], known(unit)
+
+
+def known(unit: str) -> str:
+    """A unit as UNITS calls it, where people write it in another way; else as it is."""
+    return WRITTEN.get(unit.strip(), unit.strip())
 
 
 def factor(unit: str) -> float:
@@ -104,7 +119,7 @@ def quantity(text: str, si: str, what: str) -> float:
         units = ", ".join(units_of(si)) or si
         raise MjchairError(f"{what} is {text!r}; it must be a number, with or without a unit "
                            f"({units})")  # fmt: skip
-    unit = match["unit"].strip()
+    unit = known(match["unit"])
     if not unit:
         return float(match["number"])
     if unit not in units_of(si):

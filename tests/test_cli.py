@@ -161,6 +161,14 @@ def test_a_run_that_breaks_says_when_keeps_what_it_has_and_exits_with_2(there, c
     assert recording.time.size > 20
 
 
+def test_a_run_that_breaks_by_torques_in_n_mm_says_so(there, capsys):
+    write(there / "milli.csv", "time,left_wheel\n0,0\n0.05,0\n0.06,9e3\n9,9e3\n")
+    code, out = run("simulate", "--input", "milli.csv", "--out", "run", capsys=capsys)
+    assert code == 2
+    assert "unstable" in out.err and "its input: left_wheel looks like N mm" in out.err
+    assert out.err.count("\n") == 1
+
+
 def test_render_needs_a_recording(there, capsys):
     for path in ("none.npz", "drive.csv"):
         code, out = run("render", path, "--out", "film", capsys=capsys)

@@ -488,6 +488,10 @@ BAD = {
     "cut short": (["{cut}"], "is the file cut short"),
     "text inside": (["{text}"], "is not a number"),
     "only a baseline": (["{rest}"], "a recording of an untouched rim, and none of the rim in use"),
+    "an untouched rim by its name": (["{rest}"], "take 'baseline' out of its name if it is one"),
+    "one word for it": (["{bare}"], "take 'bare' out of its name if it is one"),
+    "a run that is empty": (["{void}"], "; push_left.csv is not used: it is empty"),
+    "one file as two sides": (["{sides}"], "a_right.csv holds the samples of a_left.csv again"),
     "heavy rider": (["{good}", "--rider-mass", "95", "--mass", "92"], "the rider weighs 95 kg"),
     "radius in mm": (["{good}", "--wheel-radius", "300"], "is it in mm?"),
     "light together": (
@@ -502,7 +506,117 @@ BAD = {
     "no mapping": (["{good}", "--mapping", "none.toml"], "cannot read none.toml"),
     "wrong plan": (["{plan}"], "unknown key 'sides'; did you mean 'side'?"),
     "both left": (["{twice}"], "are both of the left wheel"),
+    "one row": (["{row}"], "run.csv is not used: 1 row of numbers; a motion takes at least 3"),
+    "torque in N mm": (["{milli}"], "run.csv: left_wheel looks like N mm: it reaches "),
 }
+
+
+def table_of(torque=12.0, code=None, header="time,left_wheel,left_wheel_speed"):
+    """A table at 100 Hz of strokes (N m); with a code for missing samples of the wheel's speed."""
+    time = np.arange(0.0, 8.0, 0.01)
+    drive = torque * np.maximum(np.sin(2.0 * np.pi * time), 0.0)
+    speed = 2.0 + 0.1 * time - 0.3 * np.cos(2.0 * np.pi * time)
+    if code is not None:
+        speed[300:340] = code
+    rows = zip(time, drive, speed, strict=True)
+    return "\n".join([header, *(f"{t:.2f},{d:.4f},{v:.5f}" for t, d, v in rows)]) + "\n"
+
+
+def test_a_file_with_one_row_is_named_and_the_others_are_gathered(tmp_path):
+    (tmp_path / "push_left.csv").write_bytes(samples.propulsion().read_bytes())
+    (tmp_path / "run.csv").write_text("time,left_wheel,left_wheel_speed\n0,0.1,2\n")
+    gathered = gather(tmp_path)
+    assert [trial.name for trial in gathered.trials] == ["push"]
+    assert "run.csv is not used: 1 row of numbers" in gathered.unused[0]
+    assert gathered.unused[0] in gathered.files["gather.log"]
+
+
+def test_a_table_of_both_wheels_is_called_and_drawn_as_both(tmp_path):
+    from mjchair.report.gathered import gathered_figure
+
+    time = np.arange(0.0, 8.0, 0.01)
+    drive = 12.0 * np.maximum(np.sin(2.0 * np.pi * time), 0.0)
+    speed = 2.0 + 0.1 * time - 0.3 * np.cos(2.0 * np.pi * time)
+    rows = np.column_stack([time, drive, drive, speed, 1.1 * speed])
+    header = "time,left_wheel,right_wheel,left_wheel_speed,right_wheel_speed"
+    np.savetxt(tmp_path / "run.csv", rows, "%.6g", ",", header=header, comments="")
+    gathered = gather(tmp_path)
+    assert gathered.summary[0].endswith("left and right table")
+    lines = gathered_figure(gathered.trials).axes[0].get_lines()
+    assert [line.get_label() for line in lines] == ["left wheel, run.csv", "right wheel, run.csv"]
+    np.testing.assert_allclose(lines[1].get_ydata(), rows[:, 4], rtol=1e-5)
+    assert lines[0].get_color() != lines[1].get_color()
+
+
+def test_a_code_for_missing_samples_is_no_speed(tmp_path):
+    (tmp_path / "run.csv").write_text(table_of(code=-9999.0))
+    gathered = gather(tmp_path)
+    speed = gathered.trials[0].columns["left_wheel_speed"]
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(speed)), np.arange(300, 340))
+    said = [line for line in gathered.notes if "run.csv" in line]
+    assert said == [
+        "run.csv: left_wheel_speed repeats -9999 from 3.00 to 3.39 s and then jumps; left out there"
+    ]
+
+
+def propulsion_with(path, moment):
+    """The SmartWheel excerpt at `path` with Mz (N m), column 24, as `moment` makes it."""
+    rows = [line.split(",") for line in samples.propulsion().read_text().splitlines()]
+    for row in rows:
+        row[23] = f"{moment(float(row[23])):.2f}"
+    path.write_text("\n".join(",".join(row) for row in rows) + "\n")
+    return path
+
+
+def test_a_moment_that_was_not_recorded_is_said_and_is_no_torque(tmp_path, capsys):
+    path = propulsion_with(tmp_path / "push_left.csv", lambda moment: 0.0)
+    gathered = gather(tmp_path)
+    said = "\n".join(gathered.notes)
+    assert "push_left.csv: Mz is 0.00 N m in every sample, while F" in said
+    assert not gathered.trials[0].instruments[0].torque
+    assert main(["outcomes", str(path)]) == 2
+    assert "Mz is 0.00 N m in every sample" in capsys.readouterr().err
+
+
+def test_a_channel_at_its_end_is_said_and_a_whole_one_is_not(tmp_path, capsys):
+    propulsion_with(tmp_path / "push_left.csv", lambda moment: min(moment, 6.0))
+    ends = [line for line in gather(tmp_path).notes if "sensor at its end" in line]
+    values = read_delimited(samples.propulsion()).values[:, 23]
+    assert ends == [
+        f"push_left.csv: Mz is 6.00 N m in {np.mean(values >= 6.0):.0%} of the samples and never "
+        "beyond: a sensor at its end tells less than was there"
+    ]
+    assert main(["outcomes", str(tmp_path / "push_left.csv")]) == 0
+    assert ends[0] in capsys.readouterr().err
+    propulsion_with(tmp_path / "push_left.csv", lambda moment: moment)
+    assert "sensor at its end" not in "\n".join(gather(tmp_path).notes)
+
+
+def test_a_baseline_of_the_other_rim_is_listed(tmp_path):
+    (tmp_path / "push_left.csv").write_bytes(samples.propulsion().read_bytes())
+    rest = samples.baseline().read_bytes()
+    (tmp_path / "baseline_right.csv").write_bytes(rest)
+    gathered = gather(tmp_path)
+    assert gathered.unused == (
+        "baseline_right.csv is not used: it is of the right rim, and no recording of that rim in "
+        "use is there",
+    )
+    assert gathered.unused[0] in gathered.files["gather.log"]
+    (tmp_path / "baseline_right.csv").rename(tmp_path / "baseline_left.csv")
+    assert not gather(tmp_path).unused
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("swl_push.csv", "'swl' in its name tells the side"),
+        ("push.csv", "taken as left, say it in gather.toml"),
+    ],
+)
+def test_a_side_that_no_plain_word_tells_is_said(name, said, tmp_path, capsys):
+    (tmp_path / name).write_bytes(samples.propulsion().read_bytes())
+    assert main(["gather", str(tmp_path), "--out", str(tmp_path / "study")]) == 0
+    assert said in capsys.readouterr().out
 
 
 @pytest.fixture(scope="module")
@@ -519,6 +633,13 @@ def bad_folders(tmp_path_factory):
         "plan/run.csv": whole,
         "plan/gather.toml": '[files."run.csv"]\nsides = "left"\n',
         "round/run.csv": "Time (ms),left_wheel_speed (rpm)\n0,0\n10,1\n20,2\n",
+        "bare/bare_rim.csv": whole,
+        "void/baseline.csv": whole,
+        "void/push_left.csv": "",
+        "sides/a_left.csv": whole,
+        "sides/a_right.csv": whole,
+        "row/run.csv": "time,left_wheel,left_wheel_speed\n0,0.1,2\n",
+        "milli/run.csv": table_of(torque=12e3),
         "twice/a_left.csv": whole,
         "twice/left_a.csv": whole.replace("0.30", "0.31"),
     }
@@ -585,6 +706,27 @@ def test_markers_alone_are_a_study_of_the_chairs_speed(tmp_path):
     (trial,) = gathered.trials
     assert trial.time[0] > 4.6 and "velocity.x" in trial.columns
     assert any("free-rolling parts" in note for note in gathered.notes)
+
+
+@pytest.mark.parametrize(
+    ("floor", "said"),
+    [
+        (None, r"trial 'run': the markers of the chair in run_rider.csv stay within 0.02 m"),
+        ("rollers", "on rollers the chair stays in place, and run_rider.csv does not tell how"),
+    ],
+)
+def test_a_chair_that_rocks_in_place_is_no_push(floor, said, tmp_path):
+    """On rollers: a rider's table alone, whose markers go to and fro with the strokes."""
+    time = np.arange(0.0, 12.0, 0.01)
+    rows = np.column_stack([time, 0.03 * np.sin(6.0 * time), 0.05 * np.sin(6.0 * time)])
+    header = "time,rider_motion,chair_speed"
+    np.savetxt(tmp_path / "run_rider.csv", rows, "%.6g", ",", header=header, comments="")
+    with pytest.raises(MjchairError, match=said):
+        gather(tmp_path, Known(floor=floor))
+    rows[:, 2] += 0.5
+    np.savetxt(tmp_path / "run_rider.csv", rows, "%.6g", ",", header=header, comments="")
+    if floor is None:
+        assert gather(tmp_path, Known(floor=floor)).trials
 
 
 def test_a_marker_file_whose_chair_stands_cannot_be_put_on_a_clock(run, tmp_path):

@@ -7,6 +7,7 @@ import pytest
 from mjchair.errors import MjchairError
 from mjchair.simulation.inputs import Inputs, constant, push_strokes, read_inputs
 from mjchair.simulation.table import read_table
+from mjchair.units import UNITS, quantity
 
 XML = """
 <mujoco>
@@ -85,6 +86,22 @@ def test_units_in_brackets_become_si(tmp_path):
     assert table.time[0] == 0.5
     assert table.columns["speed"][0] == pytest.approx(10.0)
     assert table.columns["turn"][0] == pytest.approx(np.pi)
+
+
+@pytest.mark.parametrize(
+    ("written", "unit", "size"),
+    [
+        ("°/s", "deg/s", np.pi / 180.0),
+        ("°", "deg", np.pi / 180.0),
+        ("N·m", "N m", 1.0),
+        ("N.m", "N m", 1.0),
+    ],
+)
+def test_what_people_write_for_a_unit_is_that_unit(written, unit, size, tmp_path):
+    table = read_table(write(tmp_path / "a.csv", f"time,x [{written}]\n0,2\n"))
+    assert table.columns["x"][0] == pytest.approx(2.0 * size)
+    assert table.units["x"] == unit
+    assert quantity(f"2{written}", UNITS[unit][0], "x") == pytest.approx(2.0 * size)
 
 
 def test_push_strokes_have_the_impulse_they_promise():

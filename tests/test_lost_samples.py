@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mjchair.diagnosis.data.lost_samples import without_lost
+from mjchair.measurement.lost_samples import table_without_lost, without_lost
 from mjchair.measurement.trial import Trial
 from mjchair.model.rolling import RearAxle
 from mjchair.simulation.inputs import Inputs
@@ -123,3 +123,38 @@ def test_a_rate_that_rests_or_is_written_more_often_than_measured_stays(make):
     trial = a_trial(left_wheel_speed=make)
     kept, said = without_lost(trial, AXLE)
     assert kept is trial and not said
+
+
+@pytest.mark.parametrize("span", [(0, 40), (230, 300), (760, 800)])
+def test_a_code_for_missing_samples_is_no_angle_and_no_torque(span):
+    trial = a_trial(torque=lambda t: 5.0 * np.sin(t), left_wheel_angle=lambda t, rng: 3.0 * t)
+    for values in (trial.channels["left_wheel_angle"], trial.inputs.controls["left_wheel"]):
+        values.flags.writeable = True
+        values[slice(*span)] = -9999.0
+    kept, said = without_lost(trial, AXLE)
+    gone = np.isnan(kept.channels["left_wheel_angle"])
+    np.testing.assert_array_equal(np.flatnonzero(gone), np.arange(*span))
+    np.testing.assert_array_equal(np.isnan(kept.inputs.controls["left_wheel"]), gone)
+    assert len(said) == 2 and all("repeats -9999" in line for line in said)
+
+
+def test_an_angle_and_a_torque_that_rest_stay():
+    trial = a_trial(
+        torque=lambda t: np.where(t < 4.0, 0.0, 9.0),
+        left_wheel_angle=lambda t, rng: np.maximum(0.0, 3.0 * (t - 4.0)),
+    )
+    kept, said = without_lost(trial, AXLE)
+    assert kept is trial and not said
+
+
+def test_a_table_has_the_same_rule():
+    trial = a_trial(torque=lambda t: 5.0 * np.sin(t), left_wheel_speed=pushed)
+    columns = {**trial.channels, "left_wheel": trial.inputs.controls["left_wheel"].copy()}
+    columns["left_wheel_speed"][230:300] = -9999.0
+    columns["left_wheel"][100] = 9e9
+    kept, said = table_without_lost(trial.time, columns, "a.csv", AXLE)
+    assert list(kept) == list(columns)
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(kept["left_wheel"])), [100])
+    gone = np.flatnonzero(np.isnan(kept["left_wheel_speed"]))
+    np.testing.assert_array_equal(gone, np.arange(230, 300))
+    assert len(said) == 2

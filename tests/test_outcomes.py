@@ -7,9 +7,10 @@ import pytest
 
 import mjchair
 from mjchair.cli import main
-from mjchair.errors import MjchairError
+from mjchair.errors import MjchairError, MjchairNote
 from mjchair.measurement import samples
-from mjchair.measurement.outcomes import UNITS, of_recording, outcomes, read_rim
+from mjchair.measurement.gather.gather import gather
+from mjchair.measurement.outcomes import UNITS, Outcomes, of_recording, outcomes, read_rim
 
 TOLERANCE = {"rtol": 1e-6, "atol": 1e-6}
 
@@ -125,6 +126,99 @@ def test_the_command_prints_and_writes_a_row_a_stroke(tmp_path, capsys):
     rows = out.read_text().splitlines()
     assert len(rows) == 9
     assert rows[0].startswith("push [1],start [s],push_time [s]")
+
+
+def test_a_gathered_recording_has_the_outcomes_of_its_file(ours, tmp_path):
+    """The force that cuts pushes comes along; a table without it says what it does not count."""
+    (tmp_path / "push_left.csv").write_bytes(samples.propulsion().read_bytes())
+    (tmp_path / "baseline.csv").write_bytes(samples.baseline().read_bytes())
+    gathered = gather(tmp_path)
+    for name, text in gathered.files.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    table = outcomes(read_rim(tmp_path / "push.csv"))
+    for name in UNITS:
+        apart = 0.02 if name == "peak_speed_at" else 2e-3  # cells have seven digits
+        np.testing.assert_allclose(table[name], ours[name], rtol=2e-3, atol=apart, err_msg=name)
+    assert "not counted" not in table.text()
+    trial = mjchair.read_study(tmp_path).runs[0].trial
+    assert not trial.other and set(trial.channels) == {"left_wheel_angle"}
+    assert "left_wheel_force" not in gathered.noise
+
+    trial = gathered.trials[0]
+    rows = np.column_stack(
+        [trial.time, 0.8 * trial.columns["left_wheel"], trial.columns["left_wheel_angle"]]
+    )
+    header = "time,left_wheel,left_wheel_angle"
+    np.savetxt(tmp_path / "moment.csv", rows, "%.6f", ",", header=header, comments="")
+    fewer = outcomes(read_rim(tmp_path / "moment.csv"))
+    small = int(np.sum(0.8 * ours["peak_moment"] < 25.0 * 0.27))
+    assert 0 < small < len(ours)
+    assert (len(fewer), fewer.smaller) == (len(ours) - small, small)
+    assert f"{small} smaller pushes are not counted, below 6.8 N m" in fewer.text()
+
+
+def table_with(simulated, path, change):
+    """The table of a run at `path`, after `change` of its rows (n, columns) by name -> column."""
+    simulated.to_csv(path)
+    header, *rows = (line.split(",") for line in path.read_text().splitlines())
+    change(rows, {name: k for k, name in enumerate(header)})
+    path.write_text("\n".join(",".join(row) for row in [header, *rows]) + "\n")
+    return path
+
+
+def test_strokes_in_which_the_wheel_is_not_seen_have_no_speed_and_the_others_stay(
+    simulated, tmp_path
+):
+    whole = outcomes(of_recording(simulated))
+    begin = whole["start"][1] + 0.15
+
+    def change(rows, column):
+        for row in rows:
+            if begin < float(row[column["time"]]) < begin + 0.4:
+                row[column["left_wheel_angle"]] = row[column["left_wheel_speed"]] = "-9999"
+
+    path = table_with(simulated, tmp_path / "run.csv", change)
+    with pytest.warns(MjchairNote, match="left_wheel_angle repeats -9999 from"):
+        table = outcomes(read_rim(path))
+    for name in ("mean_power", "work", "contact_angle", "mean_speed", "peak_speed_at"):
+        assert np.isnan(table[name][1])
+        assert table[name][0] == pytest.approx(whole[name][0], rel=5e-3, abs=0.02)
+    np.testing.assert_allclose(table["peak_moment"], whole["peak_moment"], rtol=5e-3)
+
+
+def test_large_numbers_stay_apart():
+    columns = {name: np.array([-1.5e6, 2.5e7]) for name in UNITS}
+    for line in Outcomes(columns, "wheel").text().splitlines()[2:]:
+        assert line[22:].split() == ["11750000.000", "18738329.701", "-1500000.000", "25000000.000"]
+
+
+def test_a_table_of_one_row_and_a_torque_in_n_mm_get_one_line(simulated, tmp_path, capsys):
+    row = table_with(
+        simulated, tmp_path / "row.csv", lambda rows, _: rows.__delitem__(slice(1, None))
+    )
+
+    def scale(rows, column):
+        for row in rows:
+            row[column["left_wheel"]] = str(1e3 * float(row[column["left_wheel"]]))
+
+    milli = table_with(simulated, tmp_path / "milli.csv", scale)
+    for path, line in ((row, "row.csv: 1 row of numbers"), (milli, "left_wheel looks like N mm")):
+        assert main(["outcomes", str(path)]) == 2
+        said = capsys.readouterr().err
+        assert line in said.splitlines()[-1]
+        assert "Warning" not in said
+
+
+def test_the_folder_of_the_table_is_made_or_refused_before_the_work(tmp_path, capsys):
+    out = tmp_path / "new" / "deep" / "outcomes.csv"
+    assert main(["outcomes", str(samples.propulsion()), "--out", str(out)]) == 0
+    assert out.is_file()
+    capsys.readouterr()
+    for command in (["outcomes", "nowhere.csv"], ["rider", "nowhere.c3d"]):
+        assert main([*command, "--out", str(out / "more" / "x.csv")]) == 2
+        assert f"{out} is a file, and must be a folder" in capsys.readouterr().err
+    assert main(["gather", "nowhere", "--out", str(out / "study")]) == 2
+    assert f"{out} is a file, and must be a folder" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -235,7 +235,7 @@ def test_licence_and_notice_lie_beside_the_data():
             lambda text: "\n".join([*text.splitlines()[:200], "battery low"]),
             "row 201 has 1 cells",
         ),
-        (lambda text: "", "no row of numbers"),
+        (lambda text: "", "it is empty"),
     ],
 )
 def test_bad_files_get_one_line(tmp_path, change, line):

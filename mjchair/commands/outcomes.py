@@ -35,12 +35,12 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 def run(args: argparse.Namespace) -> int:
     """Print the outcomes and write their table."""
     from mjchair.measurement.outcomes import outcomes, read_rim
-    from mjchair.storage import check_new
+    from mjchair.storage import check_new, make_place
 
-    if args.out:
-        check_new(args.out, args.force)
+    out = check_new(args.out, args.force) if args.out else None
     found = outcomes(read_rim(args.file, args.baseline, args.wheel))
-    if args.out:
-        found.to_csv(args.out)
+    if out is not None:
+        make_place(out)
+        found.to_csv(out)
     print(found.text())
     return 0

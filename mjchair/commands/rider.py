@@ -36,17 +36,18 @@ def run(args: argparse.Namespace) -> int:
     """Fit, print lengths and residuals, write the table and the film."""
     from mjchair.motion.capture import captured, table_text
     from mjchair.motion.inverse_kinematics import WORST, Build
-    from mjchair.storage import check_new, write_whole
+    from mjchair.storage import check_new, make_place, write_whole
 
     out = check_new(args.out, args.force)
-    if args.video:
-        check_new(args.video, args.force)
+    film = check_new(args.video, args.force) if args.video else None
     build = Build(args.chair, args.stature, args.mass)
     motion = captured(args.markers, args.chosen, args.static, build, _say)
-    if args.video:
+    if film is not None:
         from mjchair.report.marker_film import write_marker_film
 
-        write_marker_film(motion, args.video)
+        make_place(film)
+        write_marker_film(motion, film)
+    make_place(out)
     write_whole(out, table_text(motion))
     for note in motion.notes:
         print(note)

@@ -117,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
     check_vacant(args.out, args.force)
     spec = options.chair(args, timestep=args.timestep, drive=_profile(args))
     stopped = ""
-    measured = None
+    inputs = measured = None
     if args.controller:
         recording, stopped = _closed_loop(args, spec)
     else:
@@ -142,10 +142,23 @@ def run(args: argparse.Namespace) -> int:
         print(f"mjchair: {stopped}; the recording up to then is in {folder}", file=sys.stderr)
         return 2
     if recording.status is not Status.COMPLETED:
-        print(f"mjchair: {recording.describe()} in {folder}", file=sys.stderr)
+        hint = _unit_hint(inputs)
+        print(f"mjchair: {recording.describe()} in {folder}{hint}", file=sys.stderr)
         return 2
     print(f"{recording.describe()}; written to {folder}")
     return 0
+
+
+def _unit_hint(inputs: Inputs | None) -> str:
+    """What a run that broke may owe to the unit of its torques, as the end of a line."""
+    from mjchair.measurement.torque import check_torques
+
+    torques = {} if inputs is None else inputs.controls
+    try:
+        check_torques({n: v for n, v in torques.items() if n.endswith("_wheel")}, "its input")
+    except MjchairError as error:
+        return f"; {error}"
+    return ""
 
 
 def _closed_loop(args: argparse.Namespace, spec: mujoco.MjSpec) -> tuple[Recording, str]:

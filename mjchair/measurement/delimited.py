@@ -111,6 +111,8 @@ def _first_row(lines: list[str], path: Path) -> tuple[int, str]:
                 raise MjchairError(
                     f"{path}: row {index + 1} has {text!r} among its numbers; take the text out"
                 )
+    if not any(line.strip() for line in lines):
+        raise MjchairError(f"{path}: it is empty")
     raise MjchairError(
         f"{path}: no row of numbers in its first {min(PREAMBLE, len(lines))} lines; "
         "a table has a number in every column, separated by comma, semicolon or tab"

@@ -32,7 +32,7 @@ from mjchair.errors import MjchairError, nearest
 from mjchair.measurement.delimited import Delimited
 from mjchair.measurement.notes import Detail
 from mjchair.toml_file import read_toml
-from mjchair.units import UNITS
+from mjchair.units import UNITS, known
 
 Array = NDArray[np.float64]
 
@@ -270,9 +270,9 @@ def _time(file: Delimited, form: Format, rate: float) -> Array:
 
 
 def _factor(unit: str, form: Format) -> float:
-    if unit not in UNITS:
+    if known(unit) not in UNITS:
         raise MjchairError(f"mapping {form.name}: unknown unit {unit!r}" + nearest(unit, UNITS))
-    return UNITS[unit][1]
+    return UNITS[known(unit)][1]
 
 
 def _one(file: Delimited, entry: _Column, form: Format) -> Array:

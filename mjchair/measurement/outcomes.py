@@ -7,7 +7,8 @@ power, work, contact angle, and how the speed changes within the stroke.
 Strokes are cut as Kinetics Toolkit's `cycles.detect_cycles` cuts them, with the thresholds of its
 push-rim tutorial: a push begins where the hand's force rises to 5 N and ends where it falls to 2 N;
 a phase of less than 0.1 s or a push whose peak is below 25 N is none. Without a force the moment
-stands for it, on a push rim of 0.27 m.
+stands for it, on a push rim of 0.27 m; a hand's total force is larger than its part along the rim,
+so that this counts fewer pushes.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.errors import MjchairError, nearest, note
-from mjchair.measurement.smartwheel import PushRim
+from mjchair.measurement.smartwheel import PushRim, hand_force
+from mjchair.measurement.torque import check_torques
 from mjchair.measurement.trial import Trial
 from mjchair.simulation.recording import Recording
 from mjchair.simulation.table import frozen
@@ -31,6 +33,7 @@ Array = NDArray[np.float64]
 
 RISES, FALLS, PEAK = 5.0, 2.0, 25.0  # N: a push begins, ends, and must reach
 SHORTEST = 0.1  # s, of a push and of a recovery
+GAP = 5.0  # times the usual step, and SHORTEST, beyond which a wheel is not seen between samples
 RIM = 0.27  # m, radius of a push rim on a 24-inch wheel: 0.26-0.28, assumption
 UNITS = {
     "push": "1",
@@ -71,7 +74,8 @@ class Rim:
     """What one driven wheel did: all arrays (n,), forward positive.
 
     Attributes:
-      time: s. angle: rad. speed: rad/s. moment: of the hand about the axle, N m.
+      time: s. angle: rad. speed: rad/s, NaN where the wheel is not seen. moment: of the hand about
+        the axle, N m.
       force: the hand's total force, N; None: not measured. name: of the wheel.
     """
 
@@ -106,11 +110,14 @@ class Outcomes:
 
     Attributes:
       columns: name -> (strokes,), in the units of UNITS; NaN where the recording ends within the
-        stroke. wheel: its name.
+        stroke, and where the wheel is not seen in a part of it. wheel: its name.
+      smaller: pushes that are not counted, as they stay below what a push must reach. least: that.
     """
 
     columns: dict[str, Array]
     wheel: str
+    smaller: int = 0
+    least: str = ""
 
     def __len__(self) -> int:
         """Number of strokes."""
@@ -148,14 +155,22 @@ class Outcomes:
     def text(self) -> str:
         """The table for people: a row an outcome, with mean, spread and range over strokes."""
         out = [f"{self.wheel}: {len(self)} strokes"]
-        out.append(f"{'outcome':<15}{'unit':<7}{'mean':>9}{'sd':>9}{'least':>9}{'most':>9}")
+        if self.smaller:
+            pushes = (
+                "1 smaller push is" if self.smaller == 1 else f"{self.smaller} smaller pushes are"
+            )
+            out[0] += f"; {pushes} not counted, below {self.least}"
+        rows = []
         for name, values in self.columns.items():
             there = values[np.isfinite(values)]
             if name in ("push", "start") or not there.size:
                 continue
             spread = float(there.std(ddof=1)) if there.size > 1 else 0.0
             numbers = (there.mean(), spread, there.min(), there.max())
-            out.append(f"{name:<15}{UNITS[name]:<7}" + "".join(f"{v:9.3f}" for v in numbers))
+            rows.append((name, UNITS[name], [f"{v:.3f}" for v in numbers]))
+        wide = max([8, *(len(cell) for *_, cells in rows for cell in cells)]) + 1
+        for name, unit, cells in [("outcome", "unit", ["mean", "sd", "least", "most"]), *rows]:
+            out.append(f"{name:<15}{unit:<7}" + "".join(f"{cell:>{wide}}" for cell in cells))
         return "\n".join(out)
 
 
@@ -165,19 +180,25 @@ def outcomes(rim: Rim) -> Outcomes:
     Raises:
       MjchairError: there is no stroke.
     """
-    found = strokes(rim)
+    every = _pushes(rim)
+    found = [stroke for stroke, counts in every if counts]
+    least = f"{PEAK:g} N" if rim.force is not None else f"{PEAK * RIM:.1f} N m"
     if not found:
-        what = f"{PEAK:g} N" if rim.force is not None else f"{PEAK * RIM:.1f} N m"
         raise MjchairError(
-            f"{rim.name}: no push of {SHORTEST:g} s that reaches {what}; there are no outcomes"
+            f"{rim.name}: no push of {SHORTEST:g} s that reaches {least}; there are no outcomes"
         )
     rows = [_row(rim, number, stroke) for number, stroke in enumerate(found, start=1)]
     columns = {name: frozen([row[name] for row in rows]) for name in UNITS}
-    return Outcomes(columns, rim.name)
+    return Outcomes(columns, rim.name, len(every) - len(found), least)
 
 
 def strokes(rim: Rim) -> list[Stroke]:
     """Where strokes begin and end; see the module's docstring."""
+    return [stroke for stroke, counts in _pushes(rim) if counts]
+
+
+def _pushes(rim: Rim) -> list[tuple[Stroke, bool]]:
+    """Every stroke that is long enough, and whether its push reaches what one must reach."""
     scale = 1.0 if rim.force is not None else RIM
     hand = rim.force if rim.force is not None else np.abs(rim.moment)
     events = _crossings(np.asarray(hand), RISES * scale, FALLS * scale)
@@ -188,8 +209,8 @@ def strokes(rim: Rim) -> list[Stroke]:
         push = rim.time[release] - rim.time[begin]
         recovery = rim.time[end] - rim.time[release] if end >= 0 else np.inf
         high = float(np.max(hand[begin : release + 1])) >= PEAK * scale
-        if push >= SHORTEST and recovery >= SHORTEST and high:
-            found.append(Stroke(begin, release, end))
+        if push >= SHORTEST and recovery >= SHORTEST:
+            found.append((Stroke(begin, release, end), high))
     return found
 
 
@@ -212,6 +233,7 @@ def _row(rim: Rim, number: int, stroke: Stroke) -> dict[str, float]:
     push = slice(begin, release + 1)
     whole = slice(begin, end + 1) if end >= 0 else None
     moment, power = rim.moment[push], rim.moment[push] * rim.speed[push]
+    turned = rim.angle[release] - rim.angle[begin] if np.isfinite(power).all() else np.nan
     row = {
         "push": float(number),
         "start": rim.time[begin],
@@ -221,21 +243,22 @@ def _row(rim: Rim, number: int, stroke: Stroke) -> dict[str, float]:
         "peak_power": power.max(),
         "mean_power": power.mean(),
         "work": np.trapezoid(power, rim.time[push]),
-        "contact_angle": np.degrees(rim.angle[release] - rim.angle[begin]),
+        "contact_angle": np.degrees(turned),
     }
     names = ("recovery_time", "cadence", "mean_speed", "speed_change", "peak_speed_at")
     if whole is None:
         return row | dict.fromkeys(names, np.nan)
     speed, lasts = rim.speed[whole], rim.time[end] - rim.time[begin]
     fastest = (rim.time[begin + int(np.argmax(speed))] - rim.time[begin]) / lasts
+    if np.isnan(speed).any():
+        fastest = np.nan
     values = (rim.time[end] - rim.time[release], 60.0 / lasts, speed.mean(), np.ptp(speed), fastest)
     return row | dict(zip(names, values, strict=True))
 
 
 def of_push_rim(run: PushRim, name: str = "wheel") -> Rim:
     """The rim of a recording whose signs and baseline are put right."""
-    force = np.linalg.norm(run.forces[:, :3], axis=1)
-    return Rim(run.time, run.angle, run.speed, run.torque, force, name)
+    return Rim(run.time, run.angle, run.speed, run.torque, hand_force(run), name)
 
 
 def of_recording(recording: Recording, wheel: str = "left_wheel") -> Rim:
@@ -254,20 +277,34 @@ def of_trial(trial: Trial, wheel: str = "left_wheel") -> Rim:
     """The rim of a measured run that has a wheel's torque, and its angle or speed.
 
     Raises:
-      MjchairError: it has not.
+      MjchairError: it has not, or its torque is in N mm.
     """
     if trial.inputs is None or wheel not in trial.inputs.controls:
         known = trial.inputs.controls if trial.inputs is not None else ()
         raise MjchairError(f"{trial.name}: no torque of {wheel}" + nearest(wheel, known))
+    check_torques({wheel: trial.inputs.controls[wheel]}, trial.name)
     time, moment = trial.inputs.samples(wheel)
     if f"{wheel}_angle" in trial.channels:
-        angle = np.interp(time, *trial.samples(f"{wheel}_angle"))
-        return Rim(time, angle, _speed(time, angle), moment, None, wheel)
-    if f"{wheel}_speed" in trial.channels:
-        speed = np.interp(time, *trial.samples(f"{wheel}_speed"))
-        steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(time)
-        return Rim(time, np.r_[0.0, np.cumsum(steps)], speed, moment, None, wheel)
-    raise MjchairError(f"{trial.name}: neither {wheel}_angle nor {wheel}_speed is there")
+        seen, turned = trial.samples(f"{wheel}_angle")
+        angle = np.interp(time, seen, turned)
+        speed = _speed(time, angle)
+    elif f"{wheel}_speed" in trial.channels:
+        seen, speeds = trial.samples(f"{wheel}_speed")
+        speed = np.interp(time, seen, speeds)
+        angle = np.r_[0.0, np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))]
+    else:
+        raise MjchairError(f"{trial.name}: neither {wheel}_angle nor {wheel}_speed is there")
+    return Rim(time, angle, np.where(_unseen(time, seen), np.nan, speed), moment, None, wheel)
+
+
+def _unseen(time: Array, seen: Array) -> NDArray[np.bool_]:
+    """Which times (n,), s, lie in a gap of the times at which a wheel is seen, (m,), s."""
+    steps = np.diff(seen)
+    if not steps.size:
+        return np.ones(time.size, bool)
+    wide = np.flatnonzero(steps > max(SHORTEST, GAP * float(np.median(steps))))
+    at = np.searchsorted(seen, time, side="right") - 1
+    return np.isin(at, wide) & (time > seen[at])
 
 
 def _speed(time: Array, angle: Array) -> Array:
@@ -299,16 +336,26 @@ def read_rim(
       MjchairError: it is none of these, or as its reader does.
     """
     from mjchair.measurement.baseline import without_baseline
-    from mjchair.measurement.smartwheel import oriented, read_smartwheel
+    from mjchair.measurement.smartwheel import (
+        at_its_end,
+        oriented,
+        read_smartwheel,
+        without_moment,
+    )
     from mjchair.simulation.recording import load_recording
 
     path = Path(path)
     if path.suffix == ".npz":
         return of_recording(load_recording(path), wheel)
     if _has_time(path):
-        return of_trial(_trial(path), wheel)
+        return _of_table(path, wheel)
     still = read_smartwheel(baseline) if baseline is not None else None
-    run = oriented(without_baseline(read_smartwheel(path), still))
+    raw = read_smartwheel(path)
+    if without_moment(raw):
+        raise MjchairError(f"{path.name}: {without_moment(raw)}")
+    for line in at_its_end(raw):
+        note(line)
+    run = oriented(without_baseline(raw, still))
     return of_push_rim(run, path.stem)
 
 
@@ -323,7 +370,8 @@ def _has_time(path: Path) -> bool:
         raise MjchairError(f"cannot read {path}: {error.strerror}") from None
 
 
-def _trial(path: Path) -> Trial:
+def _of_table(path: Path, wheel: str) -> Rim:
+    """The rim of a table of a study, with the hand's force where the table has it."""
     from mjchair.measurement.table_wheels import put_right
     from mjchair.measurement.trial import trial_from_table
     from mjchair.model.spec import load_spec
@@ -334,4 +382,7 @@ def _trial(path: Path) -> Trial:
     for line in said:
         note(line)
     table = replace(table, columns=columns)
-    return trial_from_table(table, load_spec("manual").compile(), path.stem)
+    rim = of_trial(trial_from_table(table, load_spec("manual").compile(), path.stem), wheel)
+    if f"{wheel}_force" not in columns:
+        return rim
+    return replace(rim, force=np.interp(rim.time, *table.samples(f"{wheel}_force")))

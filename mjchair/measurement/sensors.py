@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from mjchair.model.rolling import RearAxle
+
 
 @dataclass(frozen=True, kw_only=True)
 class Sensor:
@@ -87,3 +89,8 @@ def sensor(channel: str) -> Sensor:
 def rolls(channel: str) -> bool:
     """Whether the channel is of a rear wheel's rolling, so that its limits are the chair's."""
     return channel.rsplit(".", 1)[0].endswith(("wheel_angle", "wheel_speed"))
+
+
+def limit_of(channel: str, limit: float, axle: RearAxle) -> float:
+    """A limit of a channel; a wheel's, which is of the way that it rolls, in radians."""
+    return limit / axle.radius(channel.split("_")[0]) if rolls(channel) else limit

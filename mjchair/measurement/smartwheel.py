@@ -41,6 +41,10 @@ WINDOW = 21  # samples, of the local parabola that turns angles into speed (Kine
 DEGREES = 0.1  # deg, within which column 4 is the angle of column 3
 ROLLS = 1.0  # rad, of which a wheel must turn on balance to tell which way is forward
 PUSHES = 3.0  # N m, above which a hand pushes or brakes
+CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+ENDS = 0.01  # share of the samples at one largest value, from which a sensor is at its end
+IN_A_ROW = 5  # such samples; a quantized peak is shorter
+AWAY = 0.25  # of a channel's range, by which such a value is away from its median
 CLEAR = 0.5  # share of a hand's work that must have one sign to tell the sign of Mz
 
 
@@ -226,6 +230,37 @@ def turned(run: PushRim, signs: Orientation) -> PushRim:
     )
 
 
+def without_moment(run: PushRim) -> str:
+    """That Mz is one value throughout while the wheel or a force moves, in words; "": it is not."""
+    rolled, forces = float(np.ptp(run.angle)), np.ptp(run.forces[:, :3], axis=0)
+    most = int(np.argmax(forces))
+    if np.ptp(run.torque) > 0.0 or (rolled < ROLLS and forces[most] == 0.0):
+        return ""
+    return (
+        f"Mz is {run.torque[0]:.2f} N m in every sample, while {CHANNELS[most]} changes by "
+        f"{forces[most]:.0f} N and the wheel turns by {rolled / (2.0 * np.pi):.1f} turns: its "
+        "moment was not recorded; export it again"
+    )
+
+
+def at_its_end(run: PushRim) -> list[str]:
+    """A line for each channel that stays at its largest or smallest value, as if it were cut."""
+    out = []
+    for name, values in zip(CHANNELS, run.forces.T, strict=True):
+        away = np.abs(values - np.median(values)) > AWAY * np.ptp(values)
+        for end in (float(values.max()), float(values.min())):
+            at = (values == end) & away
+            edges = np.flatnonzero(np.diff(np.r_[False, at, False].astype(int)))
+            longest = max((edges[1::2] - edges[::2]).tolist(), default=0)
+            if at.mean() >= ENDS and longest >= IN_A_ROW:
+                unit = "N" if name.startswith("F") else "N m"
+                out.append(
+                    f"{Path(run.source).name}: {name} is {end:.2f} {unit} in {at.mean():.0%} of "
+                    "the samples and never beyond: a sensor at its end tells less than was there"
+                )
+    return out
+
+
 def oriented(run: PushRim) -> PushRim:
     """The recording with the signs of `orientation`, and a note on what was turned."""
     signs = orientation(run)
@@ -238,6 +273,11 @@ def oriented(run: PushRim) -> PushRim:
         return run
     note = f"{Path(run.source).name}: {' and '.join(said)}; turned so that forward is positive"
     return replace(turned(run, signs), notes=(*run.notes, note))
+
+
+def hand_force(run: PushRim) -> Array:
+    """The hand's total force on the rim, (n,), N, of a recording without its baseline."""
+    return np.asarray(np.linalg.norm(run.forces[:, :3], axis=1))
 
 
 def push_inputs(run: PushRim) -> Inputs:

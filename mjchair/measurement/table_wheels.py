@@ -1,10 +1,10 @@
 """Wheels in a table of one's own: angles counted through their wraps, and signs that drive forward.
 
-In: the columns of a table, SI, and its clock. Out: the same columns, put right, and a line for
-everything that was changed or is left open. A hand that drives a wheel forward speeds it up, so
-torque and speed of one wheel have one sign where they go together; which way is forward, two
-wheels that roll straight tell together. A chair that turns on the spot looks like a wheel that
-counts down: only a turn that nobody makes is taken for one.
+In: the columns of a table, SI, and its clock. Out: the same columns, put right, without samples
+that are no measurement, and a line for everything that was changed or is left open. A hand that
+drives a wheel forward speeds it up, so torque and speed of one wheel have one sign where they go
+together; which way is forward, two wheels that roll straight tell together. A chair that turns on
+the spot looks like a wheel that counts down: only a turn that nobody makes is taken for one.
 """
 
 from __future__ import annotations
@@ -16,7 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
+from mjchair.errors import MjchairError
 from mjchair.measurement import encoder
+from mjchair.measurement.lost_samples import table_without_lost
+from mjchair.model.rolling import RearAxle
 
 Array = NDArray[np.float64]
 
@@ -33,6 +36,8 @@ YAW = 0.5  # rad of the chair for a rad by which its wheels turn apart: 0.3 m ov
 SEEN, UNSEEN = 0.5, 0.25  # of the turn that wheels tell, which a gyroscope sees, or does not
 RATE = 100.0  # Hz, at which torque and acceleration are compared at most
 SIDES = ("left", "right")
+FEWEST = 3  # rows, of which two steps tell how a speed changes
+USUAL = RearAxle(0.3, 0.3, 0.56)  # m, of a chair that nobody described: wheels of 24 inches
 
 
 class _Wheel(NamedTuple):
@@ -47,17 +52,35 @@ def put_right(
 ) -> tuple[dict[str, Array], list[str]]:
     """The columns with angles that go on and wheels that drive forward, and lines on it.
 
+    What is no measurement, such as a code for missing samples, is left out before.
+
     Args:
       time: (n,), s. columns: study column -> (n,), SI, NaN where a sample is missing. name: of the
         file. turn: whether signs may be turned; False: what is doubtful is only said.
+
+    Raises:
+      MjchairError: fewer than FEWEST rows, or a column without a sample.
     """
-    out, notes = unwrapped(time, columns, name)
+    if time.size < FEWEST:
+        raise MjchairError(f"{name}: {few_rows(time.size)}")
+    for column, values in columns.items():
+        if not np.isfinite(values).any():
+            raise MjchairError(f"{name}: {column} has no samples; leave the column out")
+    clean, lost = table_without_lost(time, columns, name, USUAL)
+    out, notes = unwrapped(time, clean, name)
+    notes = lost + notes
     for side, travel, moment in _signs(time, out, name, turn, notes):
         for column, sign in (("angle", travel), ("speed", travel), ("", moment)):
             whole = f"{side}_wheel_{column}".rstrip("_")
             if whole in out:
                 out[whole] = sign * out[whole]
     return out, notes
+
+
+def few_rows(count: int) -> str:
+    """What is wrong with a table of so few rows, in words."""
+    rows = "1 row of numbers" if count == 1 else f"{count} rows of numbers"
+    return f"{rows}; a motion takes at least {FEWEST}, and a trial lasts at least 1 s"
 
 
 def unwrapped(

@@ -20,7 +20,7 @@ from mjchair.model.wheels import base_name
 from mjchair.rider.anatomy import JOINT_NAMES
 from mjchair.simulation.channels import channel_units
 from mjchair.simulation.frozen import FrozenRecord
-from mjchair.simulation.inputs import OTHER_COLUMNS, Inputs, control_units, drivable
+from mjchair.simulation.inputs import HAND_FORCES, OTHER_COLUMNS, Inputs, control_units, drivable
 from mjchair.simulation.table import Array, Table, check_units, leave_out, merged, read_table
 
 MOTION = "rider_motion"
@@ -92,6 +92,8 @@ def trial_from_table(table: Table, model: mujoco.MjModel, name: str, hold: bool 
             controls[column] = values
         elif column in sensed:
             measured[column] = values
+        elif column in HAND_FORCES:  # its moment is what drives; outcomes alone take the force
+            continue
         elif column in OTHER_COLUMNS and not (column == MOTION and moving):
             other[column] = values
     idle = set(JOINT_NAMES) - set(controls)  # a rigid rider has no joints to move

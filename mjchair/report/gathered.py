@@ -76,22 +76,16 @@ def _different(trials: Sequence[GatheredTrial]) -> list[GatheredTrial]:
     return seen
 
 
-def _colour(one: Instrument, number: int) -> str:
-    return SIDES.get(f"{one.side}_wheel", SERIES[number % len(SERIES)])
-
-
 def _speeds(axes: Axes, trial: GatheredTrial) -> None:
     count: dict[str, int] = {}
     for number, one in enumerate(trial.instruments):
-        if one.speed is None:
-            continue
-        used = count[one.side] = count.get(one.side, -1) + 1
-        time = one.time - trial.begin
-        side = f"{one.side} wheel, " if one.side else ""
-        axes.plot(
-            time, one.speed, STYLES[used % len(STYLES)], lw=1.2,
-            color=_colour(one, number), label=f"{side}{one.name}",
-        )  # fmt: skip
+        for second, (side, speed) in enumerate(one.courses().items()):
+            used = count[side] = count.get(side, -1) + 1
+            axes.plot(
+                one.time - trial.begin, speed, STYLES[(used + second) % len(STYLES)], lw=1.2,
+                color=SIDES.get(f"{side}_wheel", SERIES[number % len(SERIES)]),
+                label=f"{side} wheel, {one.name}" if side else one.name,
+            )  # fmt: skip
     _forward(axes, trial)
     lines = [f"clock of {name}: {found.short()}" for name, found in trial.alignments.items()]
     axes.set_title("\n".join([trial.name, *lines]), fontsize=8, loc="left", color=NOTE)

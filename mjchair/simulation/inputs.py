@@ -337,9 +337,11 @@ def as_inputs(
     return read_inputs(given, model)
 
 
+# Total force of a hand on a push rim, from which `mjchair outcomes` cuts pushes.
+HAND_FORCES = MappingProxyType({"left_wheel_force": "N", "right_wheel_force": "N"})
 # Columns of a measured run that are neither an actuator nor a sensor, with their units: forward
 # displacement of the rider's centre of mass in the chair frame, speed and heading in the laboratory
-# of the chair as measured by markers.
+# of the chair as measured by markers, forces of the hands.
 OTHER_COLUMNS = MappingProxyType(
-    {"rider_motion": "m", "chair_speed": "m/s", "chair_heading": "rad"}
+    {"rider_motion": "m", "chair_speed": "m/s", "chair_heading": "rad", **HAND_FORCES}
 )

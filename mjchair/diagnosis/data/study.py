@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 import mujoco
 
 from mjchair.diagnosis.data import sign_checks, standstill, trial_checks, unit_checks
-from mjchair.diagnosis.data.lost_samples import without_lost
 from mjchair.errors import MjchairError
+from mjchair.measurement.lost_samples import without_lost
 from mjchair.measurement.trial import Trial, check_columns
 from mjchair.model.load import Load
 from mjchair.model.rolling import RearAxle, chair_body, rear_axle

@@ -15,13 +15,13 @@ import numpy as np
 
 from mjchair.diagnosis.data.trial_checks import averaged
 from mjchair.errors import MjchairError
-from mjchair.measurement.sensors import rolls, sensor
+from mjchair.measurement.sensors import limit_of, rolls, sensor
+from mjchair.measurement.torque import check_torques
 from mjchair.measurement.trial import Trial
 from mjchair.model.rolling import RearAxle
 from mjchair.simulation.table import Array
 
 DEGREES, GRAVITY = 180.0 / np.pi, 9.81
-TORQUE = 500.0  # N m, the most that a hand or a motor gives
 TURN = 2.0 * np.pi + 0.2  # rad, within which a heading begins
 NEAR = 1.3  # factor within which two stories differ by a unit
 ALIKE = 0.95  # cosine of two stories that are one
@@ -50,7 +50,7 @@ def check(trial: Trial, axle: RearAxle) -> None:
     """
     _check_limits(trial, axle)
     _check_rates(trial, axle)
-    _check_torque(trial)
+    check_torques(trial.inputs.controls if trial.inputs is not None else {}, trial.name)
     _check_gravity(trial)
     _compare(trial, axle, forward(trial, axle), FORWARD)
     _compare(trial, axle, turning(trial, axle), YAW)
@@ -97,11 +97,6 @@ def _size(values: Array) -> float:
     return float(np.nanpercentile(np.abs(values), 95.0))
 
 
-def limit_of(name: str, limit: float, axle: RearAxle) -> float:
-    """A limit of a channel; a wheel's, which is of the way that it rolls, in radians."""
-    return limit / axle.radius(name.split("_")[0]) if rolls(name) else limit
-
-
 def _check_limits(trial: Trial, axle: RearAxle) -> None:
     for name, values in trial.channels.items():
         kind = sensor(name)
@@ -136,15 +131,6 @@ def _check_rates(trial: Trial, axle: RearAxle) -> None:
         first = abs(float(trial.samples(name)[1][0]))
         if kind.wraps and first > TURN:
             _refuse(trial, name, "degrees", f"it begins at {first:.4g}, and a turn is 6.28", "deg")
-
-
-def _check_torque(trial: Trial) -> None:
-    for name, values in (trial.inputs.controls if trial.inputs is not None else {}).items():
-        if _size(values) > TORQUE:
-            why = (
-                f"it reaches {_size(values):.4g}, and neither hand nor motor passes {TORQUE:g} N m"
-            )
-            _refuse(trial, name, "N mm", why, "N mm")
 
 
 def _check_gravity(trial: Trial) -> None:

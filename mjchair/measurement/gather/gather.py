@@ -17,7 +17,9 @@ from mjchair.errors import MjchairError, nearest, note
 from mjchair.measurement.gather.coasts import coasts, pushes
 from mjchair.measurement.gather.instruments import (
     RIDER_COLUMNS,
+    Instrument,
     ReadsMarkers,
+    idle_baselines,
     read_instruments,
 )
 from mjchair.measurement.gather.join import GatheredTrial, heading_at, join
@@ -26,6 +28,8 @@ from mjchair.measurement.gather.sources import LOG, Source, find_sources
 from mjchair.measurement.gather.study_file import study_text
 from mjchair.measurement.gather.together import Agreed, label_of, started_together
 from mjchair.measurement.gather.without_torque import estimated
+from mjchair.measurement.sensors import rolls
+from mjchair.simulation.inputs import HAND_FORCES
 
 Array = NDArray[np.float64]
 
@@ -34,6 +38,7 @@ RESTS = 0.05  # rad/s of a wheel, below which the chair stands
 STEP = 2.0 * np.pi / 4096  # rad, of the encoders in use
 EVEN, FEW = 0.2, 6.4  # of a step, within which readings come in whole steps, of so many at most
 MANY = 3  # pushes that make a run a pushed one; one or two set a coast going
+TRAVELS = 0.5  # m, below which a chair on a floor rocks and goes nowhere; assumption
 RUNS_OFF_FLOOR = ("rollers",)  # floors on which the chair itself does not move
 
 
@@ -79,10 +84,12 @@ def gather(
     found = find_sources(folder, mappings)
     sources = _with_offsets(found.sources, offsets or {})
     instruments = read_instruments(sources, of_markers)
+    unused = (*found.unused, *idle_baselines(sources, instruments))
     names = list(dict.fromkeys(one.source.trial for one in instruments))
     if not names:
         raise MjchairError(
             f"{folder}: no wheel, no sensor on the frame and no markers among its files"
+            + "".join(f"; {line}" for line in unused[:3])
         )
     mine = {name: [one for one in instruments if one.source.trial == name] for name in names}
     joined = [join(name, mine[name]) for name in names]
@@ -92,7 +99,7 @@ def gather(
     for name, trial in zip(names, joined, strict=True):
         same = join(name, mine[name], agreed[name]) if name in agreed else trial
         same = _for_floor(same, known)
-        why = _pushed_unseen(same)
+        why = _goes_nowhere(same, known) or _pushed_unseen(same)
         if why:
             left_out.append(why)
         else:
@@ -115,9 +122,9 @@ def gather(
     text = study_text(trials, noise, known, radius, shared)
     files = {"study.toml": text} | {f"{t.name}.csv": table_text(t) for t in trials}
     summary = _summary(trials, agreed)
-    files[LOG] = "\n".join((*summary, *notes, *found.unused)) + "\n"
+    files[LOG] = "\n".join((*summary, *notes, *unused)) + "\n"
     asked = known.missing(radius)
-    return Gathered(files, tuple(trials), noise, tuple(notes), found.unused, asked, summary)
+    return Gathered(files, tuple(trials), noise, tuple(notes), unused, asked, summary)
 
 
 def _summary(trials: Sequence[GatheredTrial], agreed: Agreed) -> tuple[str, ...]:
@@ -200,6 +207,35 @@ def _usable(trial: GatheredTrial, known: Known) -> list[GatheredTrial]:
     ]
 
 
+def _goes_nowhere(trial: GatheredTrial, known: Known) -> str:
+    """Why a trial cannot be used in which nothing shows how far the chair goes; or ""."""
+    names = ", ".join(one.name for one in trial.instruments)
+    if known.floor in RUNS_OFF_FLOOR and not any(rolls(name) for name in trial.columns):
+        return (
+            f"trial {trial.name!r}: on rollers the chair stays in place, and {names} does not tell "
+            "how a wheel turns; add a wheel's file"
+        )
+    seen = [one for one in trial.instruments if one.ground is not None]
+    if trial.driven or not seen or any(rolls(name) for name in trial.columns):
+        return ""
+    way = max(_way(one) for one in seen)
+    if way >= TRAVELS:
+        return ""
+    return (
+        f"trial {trial.name!r}: the markers of the chair in {names} stay within {way:.2f} m, so it "
+        "goes nowhere; on rollers markers show no travel: add a wheel's file"
+    )
+
+
+def _way(one: Instrument) -> float:
+    """How far apart two places of a chair are along its way, by its markers, m."""
+    assert one.ground is not None
+    there = np.isfinite(one.ground)
+    time, speed = one.time[there], one.ground[there]
+    gone = np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))
+    return float(np.ptp(np.r_[0.0, gone]))
+
+
 def _pushed_unseen(trial: GatheredTrial) -> str:
     """Why a trial cannot be used that is pushed, where no wheel is seen and no torque; or ""."""
     pull = trial.columns.get("imu_accelerometer.x")
@@ -255,7 +291,7 @@ def _noise(trials: Sequence[GatheredTrial]) -> dict[str, float]:
             least[name] = max(least.get(name, 0.0), _tick(name, values) / np.sqrt(12.0))
         for begin, end in rests:
             for name, values in trial.columns.items():
-                if name in ("left_wheel", "right_wheel", *RIDER_COLUMNS):
+                if name in ("left_wheel", "right_wheel", *HAND_FORCES, *RIDER_COLUMNS):
                     continue
                 inside = (trial.time >= begin) & (trial.time <= end) & np.isfinite(values)
                 if inside.sum() > 10:

@@ -21,6 +21,7 @@ from mjchair.measurement.gather.sources import Source
 from mjchair.measurement.notes import Detail, about
 from mjchair.measurement.sensors import rolls, sensor
 from mjchair.measurement.smartwheel import Orientation, PushRim
+from mjchair.measurement.torque import check_torques
 from mjchair.rider.anatomy import JOINT_NAMES
 from mjchair.simulation.inputs import OTHER_COLUMNS
 from mjchair.simulation.table import Table, check_units, read_table
@@ -34,6 +35,8 @@ CHAIR_SPEED = "chair_speed"  # m/s, a column of a rider's motion
 CHAIR_HEADING = "chair_heading"  # rad, in the laboratory, the same
 RIDER_COLUMNS = {*JOINT_NAMES, "rider_motion", CHAIR_SPEED, CHAIR_HEADING}
 RADIUS = 0.3  # m, of a rear wheel where nothing tells it: 24 inches
+# words that tell a side to everybody
+FULL = {"left", "right", "leftwheel", "rightwheel", "gauche", "droite", "links", "rechts"}
 SEEN = 0.7  # share of the time below which it is said how little of the chair is seen
 # a file of markers and the static trial beside it -> the table of the rider's motion, and notes
 ReadsMarkers = Callable[[Path, Path | None], tuple[Table, Sequence[str]]]
@@ -53,6 +56,7 @@ class Instrument:
         by markers; None. facing: (n,) rad, of its forward axis in the laboratory, the same.
         doubted: whether its signs are those of a wheel of the other side. assumed: rate, Hz, that
         its clock has by assumption; None: it is known.
+      bare: file of the untouched rim whose offset was taken off; "": none.
       notes: one line each.
     """
 
@@ -72,7 +76,22 @@ class Instrument:
     facing: Array | None = None
     doubted: bool = False
     assumed: float | None = None
+    bare: str = ""
     notes: tuple[str, ...] = ()
+
+    @property
+    def sides(self) -> tuple[str, ...]:
+        """The sides of the wheels that it measured, of "left" and "right"."""
+        names = (*self.channels, *self.torque)
+        return tuple(s for s in OTHER if any(name.startswith(f"{s}_wheel") for name in names))
+
+    def courses(self) -> dict[str, Array]:
+        """Side -> the speed (n,) rad/s of each wheel that shows the motion; "": of markers."""
+        if self.speed is None:
+            return {}
+        found = {s: table_wheels.motion(self.time, self.channels, s) for s in self.sides}
+        told = {side: speed for side, speed in found.items() if speed is not None}
+        return told if len(told) > 1 else {self.side: self.speed}
 
 
 def read_instruments(
@@ -85,8 +104,8 @@ def read_instruments(
         left out.
 
     Raises:
-      MjchairError: as the readers do, two files of one wheel in one trial, or a file of an
-        untouched rim without one of the rim in use.
+      MjchairError: as the readers do, two files of one wheel in one trial, or one recording in
+        two files.
     """
     wheels = _wheels([s for s in sources if s.kind == "smartwheel"])
     others = [_imu(s) for s in sources if s.kind == "imu" and s.place != "body"]
@@ -129,11 +148,7 @@ def _rider(source: Source, table: Table, notes: Sequence[str] = ()) -> Instrumen
 def _wheels(sources: list[Source]) -> list[Instrument]:
     runs = [(s, smartwheel.read_smartwheel(s.path)) for s in sources if not s.baseline]
     rests = [(s, smartwheel.read_smartwheel(s.path)) for s in sources if s.baseline]
-    if rests and not runs:
-        raise MjchairError(
-            f"{rests[0][0].path}: a recording of an untouched rim, and none of the rim in use; "
-            f"name it without {sorted(baselines_words())[0]!r} if it is one"
-        )
+    _check_twins([run for _, run in (*runs, *rests)])
     signs = [smartwheel.orientation(run) for _, run in runs]
     named = _sides([s for s, _ in runs], signs)
     found = []
@@ -148,11 +163,35 @@ def _wheels(sources: list[Source]) -> list[Instrument]:
     return found
 
 
-def baselines_words() -> set[str]:
-    """The words that make a file a recording of an untouched rim."""
-    from mjchair.measurement.gather.sources import BASELINE
+def _check_twins(runs: Sequence[PushRim]) -> None:
+    """Refuse two files with the samples of one recording.
 
-    return BASELINE
+    Raises:
+      MjchairError: naming both.
+    """
+    for k, run in enumerate(runs):
+        for other in runs[:k]:
+            if np.array_equal(run.forces, other.forces) and np.array_equal(run.angle, other.angle):
+                raise MjchairError(
+                    f"{Path(run.source).name} holds the samples of {Path(other.source).name} "
+                    "again; keep one"
+                )
+
+
+def idle_baselines(sources: Sequence[Source], instruments: Sequence[Instrument]) -> list[str]:
+    """A line for each recording of an untouched rim whose offset no run has used."""
+    used = {one.bare for one in instruments}
+    out = []
+    for source in sources:
+        if source.kind != "smartwheel" or not source.baseline or str(source.path) in used:
+            continue
+        why = "the name of another baseline is nearer to those of the runs"
+        if not source.side:
+            why = "both wheels are instrumented, and its name tells no side"
+        elif source.side not in {one.side for one in instruments if one.source.kind == source.kind}:
+            why = f"it is of the {source.side} rim, and no recording of that rim in use is there"
+        out.append(f"{source.path.name} is not used: {why}")
+    return out
 
 
 def _sides(sources: list[Source], signs: list[Orientation]) -> list[tuple[str, str]]:
@@ -163,6 +202,8 @@ def _sides(sources: list[Source], signs: list[Orientation]) -> list[tuple[str, s
         told = [sources[k].side for k in beside if sources[k].side]
         if source.side:
             side, why = source.side, ""
+            if source.side_word and source.side_word not in FULL:
+                why = f"{source.side_word!r} in its name tells the side"
             if signs[i].side == OTHER[side]:
                 why = f"its name says {side}; its signs are those of a {OTHER[side]} wheel"
         elif told:
@@ -223,7 +264,7 @@ def _wheel(
     clean = smartwheel.turned(bare, signs)
     name = source.path.name
     wheel = f"{name}: {side} wheel; {_signs_text(signs)}"
-    notes = [*run.notes, f"{wheel}; {why}" if why else Detail(wheel)]
+    notes = [*run.notes, f"{wheel}; {why}" if why else Detail(wheel), *smartwheel.at_its_end(run)]
     size = float(np.hypot(base.cosine[:2], base.sine[:2]).max())
     taken = (
         f"{name}: offset {base.offset[5]:+.2f} N m and rim's weight {size:.1f} N once a turn taken "
@@ -234,20 +275,28 @@ def _wheel(
         notes.append(f"{name}: rolls backwards on balance")
     # From the first roll to the last: at the start from rest a hand pushes while the wheel is slow.
     rolling = np.flatnonzero(np.abs(clean.speed) > ROLLING)
+    channels = {f"{side}_wheel_angle": np.where(clean.there, clean.angle, np.nan)}
     torque = {f"{side}_wheel": clean.torque}
-    if rolling.size and free[rolling[0] : rolling[-1] + 1].mean() > COAST:
+    unmeasured = smartwheel.without_moment(run)
+    if unmeasured:
+        torque = {}
+        notes.append(f"{name}: {unmeasured}; its motion alone is used")
+    elif rolling.size and free[rolling[0] : rolling[-1] + 1].mean() > COAST:
         torque = {}
         notes.append(Detail(f"{name}: no hand on the rim; a coast, its torque is left out"))
+    if torque:
+        channels[f"{side}_wheel_force"] = smartwheel.hand_force(clean)
     return Instrument(
         name=name,
         source=source,
         time=np.asarray(clean.time),
-        channels={f"{side}_wheel_angle": np.where(clean.there, clean.angle, np.nan)},
+        channels=channels,
         torque=torque,
         speed=clean.speed,
         side=side,
-        free=free,
+        free=None if unmeasured else free,
         radius=_radius(clean),
+        bare="" if rest is None else rest.source,
         notes=tuple(notes),
     )
 
@@ -331,10 +380,11 @@ def _table(source: Source) -> Instrument:
         if RIDER_COLUMNS & set(table.columns) and not _of_wheel(table):
             return _rider(source, table)
         time, columns, trigger = np.asarray(table.time), dict(table.columns), None
+    wheels: tuple[str, ...] = ("left_wheel", "right_wheel")
     columns, notes = table_wheels.put_right(time, columns, source.path.name, export is None)
     notes = [*export.notes, *notes] if export is not None else notes
-    wheels: tuple[str, ...] = ("left_wheel", "right_wheel")
     torque = {name: columns.pop(name) for name in wheels if name in columns}
+    check_torques(torque, source.path.name)
     courses = {one: table_wheels.motion(time, columns, one) for one in ("left", "right")}
     side = next((one for one, speed in courses.items() if speed is not None), "")
     return Instrument(

@@ -28,6 +28,7 @@ from msgspec import Struct
 from mjchair.errors import MjchairError, nearest
 from mjchair.measurement.delimited import Delimited, read_delimited
 from mjchair.measurement.exports import Format, matching, read_formats
+from mjchair.measurement.table_wheels import FEWEST, few_rows
 from mjchair.toml_file import read_toml
 
 PLAN = "gather.toml"
@@ -78,7 +79,8 @@ class Source:
 
     Attributes:
       path: the file. kind: "smartwheel", "imu", "table" or "markers". trial: its trial.
-      side: "left", "right" or "". place: of an IMU, "frame", "body", a wheel, or "".
+      side: "left", "right" or "". side_word: the word of its name that tells it, or "".
+      place: of an IMU, "frame", "body", a wheel, or "".
       baseline: of an untouched rim. still: markers of a person at rest. offset: s, given by hand,
         None otherwise. format: of an export.
       file: what was read of a delimited file.
@@ -88,6 +90,7 @@ class Source:
     kind: str
     trial: str
     side: str = ""
+    side_word: str = ""
     place: str = ""
     baseline: bool = False
     still: bool = False
@@ -108,7 +111,8 @@ def find_sources(folder: Path, mappings: Sequence[Path] = ()) -> Found:
     """The instruments' files in a folder; see the module's docstring.
 
     Raises:
-      MjchairError: no folder, no file of a known kind, or a bad gather.toml.
+      MjchairError: no folder, no file of a known kind, a bad gather.toml, or a recording of an
+        untouched rim without one of the rim in use.
     """
     if not folder.is_dir():
         raise MjchairError(f"no folder {folder}; give the folder with the instruments' files")
@@ -129,7 +133,8 @@ def find_sources(folder: Path, mappings: Sequence[Path] = ()) -> Found:
         if not kind:
             unused.append(f"{inside} is not used: {why}")
             continue
-        found = Source(path, kind, _trial(inside), _side(inside), _place(inside, kind))
+        side, word = _side(inside)
+        found = Source(path, kind, _trial(inside), side, word, _place(inside, kind))
         words = set(_words(inside))
         found = replace(
             found,
@@ -138,13 +143,35 @@ def find_sources(folder: Path, mappings: Sequence[Path] = ()) -> Found:
             format=form,
             file=file,
         )
-        sources.append(replace(found, **plan.get(str(inside), {})))
+        given = plan.get(str(inside), {})
+        found = replace(found, side_word="" if "side" in given else word)
+        sources.append(replace(found, **given))
     _check_plan(plan, folder)
     if not sources:
         lines = "; ".join(unused[:3]) or f"there is none that ends in {', '.join(SUFFIXES)}"
-        raise MjchairError(f"{folder}: no file of a known kind: {lines}")
+        raise MjchairError(f"{folder}: no file of a known kind that can be used: {lines}")
+    _check_baselines(sources, unused, folder)
     sources = _without_tags(sources, plan, folder)
     return Found(tuple(_one_trial(sources, plan)), tuple(unused))
+
+
+def _check_baselines(sources: Sequence[Source], unused: Sequence[str], folder: Path) -> None:
+    """Refuse a folder whose rims are all untouched.
+
+    Raises:
+      MjchairError: naming the word that makes a file such a recording, and the files not used.
+    """
+    rims = [source for source in sources if source.kind == "smartwheel"]
+    if not rims or not all(source.baseline for source in rims):
+        return
+    inside = rims[0].path.relative_to(folder)
+    word = next((word for word in _words(inside) if word in BASELINE), "")
+    rename = f"; take {word!r} out of its name if it is one" if word else ""
+    lines = "".join(f"; {line}" for line in unused[:3])
+    raise MjchairError(
+        f"{rims[0].path}: a recording of an untouched rim, and none of the rim in use"
+        f"{rename}{lines}"
+    )
 
 
 class _File(Struct, forbid_unknown_fields=True):
@@ -201,6 +228,8 @@ def _kind(
     if form is not None:
         return str(form.mapping.kind), form, file, ""
     if file.header and file.header[0].lower().split("[")[0].strip() == "time":
+        if len(file.values) < FEWEST:
+            return "", None, None, few_rows(len(file.values))
         return "table", None, file, ""
     if file.values.shape[1] in (24, 25):
         return "smartwheel", None, file, ""
@@ -233,16 +262,18 @@ def _words(inside: Path) -> list[str]:
     return [word for word in re.split(r"[^A-Za-z0-9]+", text.lower()) if word]
 
 
-def _side(inside: Path) -> str:
-    sides = {SIDES[word] for word in _words(inside) if word in SIDES}
-    return sides.pop() if len(sides) == 1 else ""
+def _side(inside: Path) -> tuple[str, str]:
+    """The side that a file's name tells, and the word that tells it; both empty: none does."""
+    words = [word for word in _words(inside) if word in SIDES]
+    sides = {SIDES[word] for word in words}
+    return (sides.pop(), words[-1]) if len(sides) == 1 else ("", "")
 
 
 def _place(inside: Path, kind: str) -> str:
     if kind != "imu":
         return ""
     words = _words(inside)
-    side = _side(inside)
+    side, _ = _side(inside)
     if side and ({"wheel", "leftwheel", "rightwheel"} & set(words)):
         return f"{side}_wheel"
     return next((PLACES[word] for word in words if word in PLACES), "")

@@ -69,5 +69,6 @@ def label_of(one: Instrument) -> str:
     """What an instrument is, the same in all trials: kind, and side or place."""
     kind = {"smartwheel": "rim", "imu": "sensor", "markers": "markers", "table": "table"}
     words = [kind.get(one.source.kind, one.source.kind)]
-    where = one.source.place.replace("_", " ") or one.side
+    sides = " and ".join(one.sides) or one.side
+    where = one.source.place.replace("_", " ") or sides
     return " ".join([where, *words]) if where and one.ground is None else words[0]

@@ -1,10 +1,12 @@
 """Samples that are no measurement: spikes of a lost bit, and a value that a broken line repeats.
 
-In: a trial, and the rear axle of the chair. Out: the trial without them, and a note on each
-channel. A spike passes what a wheelchair shows at all, or is far from its neighbours on both sides
-and they are not. Of an accelerometer a shock of one sample is real, so there the first alone
-counts; where many samples are so, the unit is wrong and not the sample. A value is held where a
-rate that else changes from sample to sample stays the same to the last digit, and then jumps.
+In: a trial or the columns of a table, and the rear axle of the chair. Out: the same without them,
+and a note on each channel. A spike passes what a wheelchair shows at all, or is far from its
+neighbours on both sides and they are not. Of an accelerometer a shock of one sample is real, so
+there the first alone counts; where many samples are so, the unit is wrong and not the sample. A
+value is held where a rate that else changes from sample to sample stays the same to the last digit,
+and then jumps. An angle or a torque may rest; of these a value is held where it comes and goes by a
+jump that none makes, as the code -9999 of a missing sample does.
 """
 
 from __future__ import annotations
@@ -17,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from mjchair.diagnosis.data.unit_checks import TORQUE, limit_of
-from mjchair.measurement.sensors import sensor
+from mjchair.measurement.sensors import limit_of, sensor
+from mjchair.measurement.torque import TORQUE
 from mjchair.measurement.trial import Trial
 from mjchair.model.rolling import RearAxle
 
@@ -35,6 +37,8 @@ HELD_SAMPLES = 10
 CHANGES = 0.9  # of the other steps of such a channel, in which it changes
 JUMP = 10.0  # times its usual step, by which it goes on after that
 MOVES = 0.2  # of what it usually shows; below it the chair may stand
+LEAP = 20.0  # rad, three turns, by which no angle changes from sample to sample (assumption)
+WHEELS = ("left_wheel", "right_wheel")  # columns of a table that are torques
 
 
 def without_lost(trial: Trial, axle: RearAxle) -> tuple[Trial, list[str]]:
@@ -43,16 +47,35 @@ def without_lost(trial: Trial, axle: RearAxle) -> tuple[Trial, list[str]]:
     Args:
       axle: of the chair, for the limits of its wheels.
     """
-    channels, said = _cleaned(trial.time, trial.channels, trial.name, axle)
-    channels, held = _without_held(trial.time, channels, trial.name)
-    said += held
+    channels, said = _measured(trial.time, trial.channels, trial.name, axle)
     out = replace(trial, channels=channels) if said else trial
     if trial.inputs is None:
         return out, said
-    controls, more = _cleaned(trial.inputs.time, trial.inputs.controls, trial.name, None)
+    controls, more = _measured(trial.inputs.time, trial.inputs.controls, trial.name, None)
     if more:
         out = replace(out, inputs=replace(trial.inputs, controls=controls))
     return out, said + more
+
+
+def table_without_lost(
+    time: Array, columns: Mapping[str, Array], name: str, axle: RearAxle
+) -> tuple[dict[str, Array], list[str]]:
+    """The same of the columns (n,) of a table, SI, at times (n,), s; `name`: of its file."""
+    driven = {column: values for column, values in columns.items() if column in WHEELS}
+    sensed = {column: values for column, values in columns.items() if column not in WHEELS}
+    channels, said = _measured(time, sensed, name, axle)
+    torques, more = _measured(time, driven, name, None)
+    both = {**channels, **torques}
+    return {column: both[column] for column in columns}, said + more
+
+
+def _measured(
+    time: Array, columns: Mapping[str, Array], run: str, axle: RearAxle | None
+) -> tuple[Mapping[str, Array], list[str]]:
+    """Columns with NaN in place of both kinds, and a note on each; no axle: they are torques."""
+    clean, said = _cleaned(time, columns, run, axle)
+    clean, held = _without_held(time, clean, run, driven=axle is None)
+    return clean, said + held
 
 
 def _cleaned(
@@ -103,15 +126,13 @@ def _spikes(name: str, time: Array, values: Array, axle: RearAxle) -> NDArray[np
 
 
 def _without_held(
-    time: Array, columns: Mapping[str, Array], run: str
+    time: Array, columns: Mapping[str, Array], run: str, driven: bool
 ) -> tuple[Mapping[str, Array], list[str]]:
-    """Columns with NaN where a rate repeats one value, and a note on each."""
+    """Columns with NaN where one value is repeated, and a note on each; `driven`: torques."""
     out, said = dict(columns), []
     for name, values in columns.items():
-        if sensor(name).most is None or sensor(name).unit == "rad":
-            continue
         there = np.flatnonzero(np.isfinite(values))
-        for first, last in _held(time[there], values[there]):
+        for first, last in _parts(name, time[there], values[there], driven):
             at = there[first : last + 1]
             out[name] = np.where(np.isin(np.arange(values.size), at), np.nan, out[name])
             said.append(
@@ -121,17 +142,44 @@ def _without_held(
     return MappingProxyType(out), said
 
 
-def _held(time: Array, values: Array) -> list[tuple[int, int]]:
-    """First and last sample of each part in which a channel repeats one value."""
-    if values.size < 2 * HELD_SAMPLES:
-        return []
-    steps = np.diff(values)
-    edges = np.flatnonzero(np.diff(np.r_[False, steps == 0.0, False].astype(int)))
-    parts = [
+def _parts(name: str, time: Array, values: Array, driven: bool) -> list[tuple[int, int]]:
+    """First and last sample of each part of a channel that is no measurement."""
+    kind = sensor(name)
+    if driven:
+        return _coded(time, values, TORQUE)
+    if kind.unit == "rad":
+        return _coded(time, values, LEAP)
+    return [] if kind.most is None else _held(time, values)
+
+
+def _coded(time: Array, values: Array, least: float) -> list[tuple[int, int]]:
+    """The parts that repeat one value and come and go by jumps of more than `least`."""
+    steps = np.r_[0.0, np.abs(np.diff(values)), 0.0]
+    parts = [] if values.size < 2 * HELD_SAMPLES else _repeated(time, values)
+    ends = {0, values.size}
+    return [
+        (a, b)
+        for a, b in parts
+        if (a, b + 1) != (0, values.size)
+        and all(edge in ends or steps[edge] > least for edge in (a, b + 1))
+    ]
+
+
+def _repeated(time: Array, values: Array) -> list[tuple[int, int]]:
+    """The parts in which a channel repeats one value for HELD and for HELD_SAMPLES."""
+    edges = np.flatnonzero(np.diff(np.r_[False, np.diff(values) == 0.0, False].astype(int)))
+    return [
         (int(a), int(b))
         for a, b in zip(edges[::2], edges[1::2], strict=True)
         if b - a >= HELD_SAMPLES and time[b] - time[a] >= HELD
     ]
+
+
+def _held(time: Array, values: Array) -> list[tuple[int, int]]:
+    """First and last sample of each part in which a channel repeats one value."""
+    if values.size < 2 * HELD_SAMPLES:
+        return []
+    steps, parts = np.diff(values), _repeated(time, values)
     same = np.zeros(steps.size, bool)
     for a, b in parts:
         same[a:b] = True
