@@ -25,7 +25,7 @@ from mjchair.report.colours import FORCES, rgb
 from mjchair.report.film_legend import BAR, INK, WHITE, Scale, font, legend
 from mjchair.report.forces import Array, WheelForces, wheel_forces
 from mjchair.report.slope_scenery import Box, build_ramp, grade_of
-from mjchair.simulation.initial import tire_geoms
+from mjchair.simulation.floor import tire_geoms
 from mjchair.simulation.recording import Recording, Status
 from mjchair.storage import atomic_file
 
