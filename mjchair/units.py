@@ -61,6 +61,11 @@ def split_header(text: str) -> tuple[str, str]:
     return match["name"], unit.strip()
 
 
+def with_unit(value: float, unit: str) -> str:
+    """A number and its unit in words: "3 N", and "3" where the unit is 1."""
+    return f"{value:g}" if unit in ("", "1") else f"{value:g} {unit}"
+
+
 def factor(unit: str) -> float:
     """What a number in a unit of UNITS is multiplied by to be in SI; 1 for no unit."""
     return UNITS[unit][1] if unit else 1.0
