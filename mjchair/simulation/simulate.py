@@ -31,6 +31,7 @@ from mjchair.simulation.inputs import Inputs, as_inputs, drivable
 from mjchair.simulation.recording import Recording, Status
 from mjchair.simulation.standing import fall_of_run, leaning_on
 from mjchair.simulation.stored_model import StoredModel
+from mjchair.units import with_unit
 
 Array = NDArray[np.float64]
 
@@ -117,7 +118,7 @@ def simulate(
 def check_positive(name: str, value: float, unit: str) -> None:
     """Raise MjchairError unless a value is positive and finite."""
     if not (np.isfinite(value) and value > 0.0):
-        raise MjchairError(f"{name} is {value:g} {unit}; it must be positive")
+        raise MjchairError(f"{name} is {with_unit(value, unit)}; it must be positive")
 
 
 def _steps(timestep: float, inputs: Inputs | None, duration: float | None) -> int:

@@ -27,6 +27,7 @@ from mjchair.tasks import (
 )
 from mjchair.tasks.environment import Environment
 from mjchair.tasks.task import ChairTask
+from mjchair.units import with_unit
 
 
 @dataclass(frozen=True)
@@ -128,7 +129,7 @@ def describe(name: str) -> str:
       MjchairError: there is no task of that name.
     """
     lines = [
-        f"{q.name} {q.shape} {q.unit} [{q.low}, {q.high}]: {q.text}"
+        f"{with_unit(f'{q.name} {q.shape}', q.unit)} [{q.low}, {q.high}]: {q.text}"
         for q in find(name).task(random=0).quantities
     ]
     return "\n".join(lines)
