@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 
-from mjchair.errors import MjchairError, nearest
+from mjchair.errors import MjchairError
 
 # unit -> (SI unit, factor)
 UNITS: dict[str, tuple[str, float]] = {
@@ -34,7 +34,10 @@ UNITS: dict[str, tuple[str, float]] = {
     "kN": ("N", 1000.0),
     "N m": ("N m", 1.0),
     "Nm": ("N m", 1.0),
+    "N cm": ("N m", 1e-2),
+    "Ncm": ("N m", 1e-2),
     "N mm": ("N m", 1e-3),
+    "Nmm": ("N m", 1e-3),
     "1": ("1", 1.0),
     "%": ("1", 1e-2),
 }
@@ -49,8 +52,43 @@ WRITTEN = {
     "N.m": "N m",
 }
 
+# names of units in full, longest first -> their symbols in UNITS
+NAMES = {
+    "degrees": "deg",
+    "degree": "deg",
+    "radians": "rad",
+    "seconds": "s",
+    "second": "s",
+    "sec": "s",
+    "metres": "m",
+    "meters": "m",
+    "kph": "km/h",
+    "kmh": "km/h",
+    "newton": "n",
+    "percent": "%",
+}
+
 _WITH_UNIT = re.compile(r"^(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?$")
 _QUANTITY = re.compile(r"^(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>.*)$")
+
+
+def nearest_unit(unit: str) -> str:
+    """The end of an error line about an unknown unit; it asks only for another way to write it.
+
+    Units that look alike may measure something else: N cm is no cm, and lbf no lb.
+    """
+    plain = _plain(unit)
+    same = next((known for known in UNITS if _plain(known) == plain), None)
+    listing = f"known: {', '.join(UNITS)}"
+    return f"; did you mean {same!r}? ({listing})" if same else f"; {listing}"
+
+
+def _plain(unit: str) -> str:
+    """A unit without what people write in different ways: case, spaces, dots, names in full."""
+    text = unit.lower().replace("\u00b2", "2").replace("\u00b0", "deg")
+    for name, short in NAMES.items():
+        text = text.replace(name, short)
+    return re.sub(r"[\s.*^_()\u00b7]", "", text)
 
 
 def split_header(text: str) -> tuple[str, str]:
@@ -68,13 +106,19 @@ def split_header(text: str) -> tuple[str, str]:
     if unit is None:
         return match["name"], ""
     if known(unit) not in UNITS:
-        raise MjchairError(f"column {text!r}: unknown unit {unit!r}" + nearest(unit, UNITS))
+        raise MjchairError(f"column {text!r}: unknown unit {unit!r}" + nearest_unit(unit))
     return match["name"], known(unit)
 
 
 def known(unit: str) -> str:
     """A unit as UNITS calls it, where people write it in another way; else as it is."""
     return WRITTEN.get(unit.strip(), unit.strip())
+
+
+def with_unit(value: float | str, unit: str) -> str:
+    """A number, or its text, and its unit: "3 N", and "3" where the unit is 1."""
+    told = value if isinstance(value, str) else f"{value:g}"
+    return told if unit in ("", "1") else f"{told} {unit}"
 
 
 def factor(unit: str) -> float:

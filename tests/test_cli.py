@@ -111,6 +111,10 @@ BAD = {
     ),
     "step of the flat": (["--step", "20mm"], "the scene has no geom 'step'"),
     "no heights": (["--scene", "hfield", "--heights", "gone.csv"], "cannot read gone.csv"),
+    "heights in metres": (
+        ["--scene", "hfield", "--heights", "uneven:rms=5"],
+        "rms is 5 m; it must be within 0 to 0.2; write mm, as rms=5mm",
+    ),
     "words for heights": (["--scene", "hfield", "--heights", "drive.csv"], "no table of numbers"),
 }
 

@@ -10,7 +10,8 @@ from mjchair.engine.views import data_view
 from mjchair.model.ground import uneven
 from mjchair.report.forces import wheel_forces
 from mjchair.simulation.contacts import wheel_contacts
-from mjchair.simulation.initial import as_initial, start, tire_geoms
+from mjchair.simulation.floor import tire_geoms
+from mjchair.simulation.initial import as_initial, start
 
 DRIVE = {"left_wheel": 12.0, "right_wheel": 9.0}
 PLACES = {

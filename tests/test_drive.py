@@ -222,6 +222,19 @@ def test_an_empty_battery_stops_the_chair():
     push(data, 1.0)
     mujoco.mj_step(model, data, nstep=500)
     assert data.joint("left_wheel").qvel[0] == 0.0
+    assert data.sensor("drive").data[3] == 0.0, "standby takes no charge that is not there"
+
+
+def test_a_battery_that_runs_empty_stays_empty():
+    drive = plain_drive()
+    model, data = stand(replace(drive, battery=replace(drive.battery, charge=1e-4, capacity=1.0)))
+    push(data, 1.0)
+    charge = np.empty(3000)
+    for k in range(charge.size):
+        mujoco.mj_step(model, data)
+        charge[k] = data.sensor("drive").data[3]
+    assert charge[0] > 0.0 and (np.diff(charge) <= 0.0).all() and charge.min() >= 0.0
+    assert charge[-1] < 1e-9 and abs(data.joint("left_wheel").qvel[0]) < 1e-3
 
 
 # state

@@ -129,9 +129,26 @@ def test_an_arrow_of_the_right_colour_is_near_the_wheel_that_carries_the_force(
 @drawn
 def test_the_legend_names_every_colour(turning):
     with Film(turning, 480, 360) as film:
-        corner = film.frame(10)[:90, :260]
+        corner = film.frame(10)[300:]
     for colour in FORCES.values():
         assert close_to(corner, colour).sum() > 20
+
+
+@drawn
+@pytest.mark.parametrize(("width", "height"), [(640, 480), (480, 480), (960, 540)])
+@pytest.mark.parametrize("view", ["front", "behind", "side"])
+def test_the_legend_hides_neither_the_person_nor_the_chair(turning, width, height, view):
+    with Film(turning, width, height, view) as film:
+        film.frame(10)
+        hidden = np.asarray(film._overlay)[..., 3] > 0
+        hair = film.model.geom("chair_manual_hair")
+        first = film.model.mesh_vertadr[hair.dataid[0]]
+        points = film.model.mesh_vert[first : first + film.model.mesh_vertnum[hair.dataid[0]] : 20]
+        head = points @ film.data.geom(hair.id).xmat.reshape(3, 3).T + film.data.geom(hair.id).xpos
+        for point in (*head, *film.data.geom_xpos[1:]):
+            column, row = film.pixel(point, 10)
+            assert not hidden[row, column]
+    assert hidden.any()
 
 
 @drawn
@@ -218,6 +235,8 @@ def test_frames_are_taken_at_their_times(turning):
     [
         ({"path": "a.avi"}, "a film is written as .mp4"),
         ({"width": 161}, "even numbers"),
+        ({"width": 10, "height": 10}, "size is 10x10 pixels; each side must be 48 to 4096"),
+        ({"width": 100000}, "size is 100000x540 pixels"),
         ({"view": "inside"}, "unknown view 'inside'; did you mean 'side'"),
         ({"fps": -1.0}, "both must be positive"),
     ],

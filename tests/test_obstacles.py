@@ -8,6 +8,7 @@ from mujoco import batch
 
 import mjchair
 from mjchair.model.ground import uneven
+from mjchair.simulation.initial import _place
 
 WHEELS = ("left_wheel", "right_wheel", "left_caster", "right_caster")
 TIRE_GEOMS = [f"{wheel}_tire" for wheel in WHEELS]
@@ -407,3 +408,46 @@ def test_bad_grounds_are_named():
         mjchair.load_spec(step=0.01)
     with pytest.raises(mjchair.MjchairError, match="step is -1 m"):
         mjchair.load_spec(scene="kerb", step=-1.0)
+
+
+def test_on_a_sloping_height_field_a_run_starts_as_on_a_ramp():
+    grade, begin = 0.08, {"position": (-2.0, 1.0), "heading": 0.7, "speed": 0.8, "yaw_rate": 0.2}
+    heights = np.tile(grade * np.linspace(-5.0, 5.0, 201), (101, 1))
+    field = mjchair.load_spec(scene="hfield", heights=heights)
+    on_field = mjchair.simulate(field, None, 0.3, initial=begin)
+    on_ramp = mjchair.simulate(
+        mjchair.load_spec(scene="ramp", grade=grade), None, 0.3, initial=begin
+    )
+    assert np.abs(on_field.qpos - on_ramp.qpos).max() < 1e-4  # m, rad; heights in single precision
+    assert np.abs(on_field.qvel[0] - on_ramp.qvel[0]).max() < 1e-4
+
+
+def test_on_an_uneven_field_a_run_starts_where_how_and_as_fast_as_it_is_told():
+    spec = mjchair.load_spec(scene="hfield", heights=uneven(0.005, seed=1))
+    begin = mjchair.Initial((-2.0, 1.0), 0.7, speed=0.8)
+    run = mjchair.simulate(spec, None, 0.1, initial=begin)
+    np.testing.assert_allclose(run.vector("position")[0, :2], (-2.0, 1.0), atol=1e-9)
+    assert run["heading"][0] == pytest.approx(0.7, abs=1e-3)
+    assert run["velocity.x"][0] == pytest.approx(0.8, abs=1e-3)
+    load = sum(run[f"{wheel}_tire.Fz"][0] for wheel in WHEELS)
+    assert load == pytest.approx(90.0 * 9.81, rel=0.02), "it is settled"
+    sliding = [np.abs(run[f"{wheel}_tire.Fx"][:25]).max() for wheel in WHEELS]
+    assert max(sliding) < 20.0, "N; wheels with another speed slide: 100 N"
+
+
+def test_no_wheel_is_placed_inside_of_a_ridge():
+    """60 mm high and 0.15 m before the axle: the wheels' round (0.3 m) rests on it."""
+    heights = np.tile(np.where(abs(np.linspace(-5.0, 5.0, 201) - 1.2) < 0.01, 0.06, 0.0), (101, 1))
+    model = mjchair.load_spec(scene="hfield", heights=heights).compile()
+    data = mujoco.MjData(model)
+    _place(model, data, mjchair.Initial((1.05, 0.0)))
+    assert data.qpos[2] == pytest.approx(0.06 - (0.3 - np.sqrt(0.3**2 - 0.15**2)), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "begin", [{"position": (4.8, 0.0)}, {"position": (7.0, 0.0), "speed": 1.0}]
+)
+def test_beside_the_height_field_no_run_starts(begin):
+    spec = mjchair.load_spec(scene="hfield")
+    with pytest.raises(mjchair.MjchairError, match=r"goes to 5 and 2.5 m .*start the chair on it"):
+        mjchair.simulate(spec, None, 0.1, initial=begin)

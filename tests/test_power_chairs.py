@@ -71,6 +71,30 @@ def test_energy_closes(name, scene, grade):
         assert getattr(balance, part) > 0.0
 
 
+def test_what_is_left_of_the_energy_is_the_error_of_the_step():
+    """Halved with the step: what does not go away is energy that is kept or lost somewhere else."""
+    inputs = held([0, 2, 4, 5], [0.8, 0.8, 0.0, 0.0], [0.0, 0.5, 0.0, 0.0])
+    left = []
+    for step in (0.002, 0.001):
+        spec = mjchair.load_spec("power", "ramp", grade=-1 / 12, drive="normal")
+        spec.option.timestep = step
+        left.append(energy_balance(spec, inputs).missing)
+    assert abs(left[0]) < 1.0, "J"
+    assert abs(left[1] - 0.5 * left[0]) < 0.02, "J"
+
+
+def test_a_full_battery_takes_no_charge_and_warms_instead():
+    spec = mjchair.load_spec("power", "ramp", grade=-1 / 6, drive="normal")
+    inputs = held([0, 4], [0.9, 0.9])
+    run = mjchair.simulate(spec, inputs, sample_rate=50.0)
+    assert run["drive.battery_current"].min() < -1.0, "A: it brakes downhill, or nothing is tested"
+    assert run["drive.battery_charge"].max() <= 1.0
+    assert run["drive.battery_power"][-1] == 0.0, "W: it is full again, and takes no more"
+    balance = energy_balance(spec, inputs)
+    assert abs(balance.battery) < 1.0 and abs(balance.missing) < 1.0, "J"
+    assert balance.internal > 400.0, "J: what it gives back is heat in the battery"
+
+
 def test_an_energy_balance_needs_a_drive():
     with pytest.raises(mjchair.MjchairError, match="0 drives"):
         energy_balance(mjchair.load_spec("power"), {"left_wheel": 1.0}, 0.1)

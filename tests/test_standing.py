@@ -8,7 +8,7 @@ import pytest
 
 import mjchair
 from mjchair.cli import main
-from mjchair.errors import MjchairError
+from mjchair.errors import MjchairError, MjchairNote
 from mjchair.simulation.initial import Initial, start
 from mjchair.simulation.settling import NotStandingError
 from mjchair.simulation.standing import UNLOADED, Fall, first_fall
@@ -60,6 +60,32 @@ def test_with_anti_tippers_it_leans_on_them():
         data = start(model, Initial(), brakes=True)
     assert 3.0 < lean(model, data) < 7.0, "rollers 25 mm above the floor, 0.3 m behind the axle"
     assert np.abs(data.qvel).max() == 0.0
+
+
+@pytest.mark.parametrize("grade", [0.2, 0.268])
+def test_where_it_leans_with_its_brakes_locked_it_does_with_its_wheels_held(grade):
+    model, at_rest = build(grade), []
+    for brakes in (True, False):
+        with mjchair.installed():
+            at_rest.append(start(model, Initial(), brakes))
+        model.eq_active0[:] = 0
+    locked, held = (lean(model, data) for data in at_rest)
+    assert held == pytest.approx(locked, abs=0.01)
+
+
+@pytest.mark.parametrize("brakes", [True, False])
+def test_a_run_that_starts_on_the_anti_tippers_says_so(brakes):
+    spec = mjchair.load_spec(scene="ramp", grade=0.268)
+    said = "leaning on left_anti_tip and right_anti_tip; left_caster and right_caster carry 0 N"
+    with pytest.warns(MjchairNote, match=said):
+        mjchair.simulate(spec, None, 0.05, brakes=brakes)
+    with pytest.warns(MjchairNote, match=said):
+        mjchair.Simulator(spec, brakes=brakes)
+
+
+def test_a_run_that_starts_on_its_wheels_says_nothing_of_it(recwarn):
+    mjchair.simulate(mjchair.load_spec(scene="ramp", grade=0.1), None, 0.05, brakes=True)
+    assert not recwarn.list
 
 
 @pytest.mark.parametrize("tilt", ["floor", "gravity"])

@@ -1,6 +1,8 @@
 """The tilting platform against the closed form of a rigid chair, worked out here anew."""
 
 import math
+import subprocess
+import sys
 
 import mujoco
 import numpy as np
@@ -136,3 +138,29 @@ def test_a_chair_that_falls_over_while_it_is_put_down(tmp_path):
     path.write_text(spec.to_xml())
     with pytest.raises(MjchairError, match="does not come to rest"):
         Platform(Design(str(path)), Setup("forward"))
+
+
+@pytest.mark.parametrize("before", ["reminder", "tires"])
+def test_what_the_process_did_before_changes_no_number_and_warns_of_nothing(before):
+    """The stops' platform has no tires by intent: neither the reminder nor tires may be there."""
+    code = f"""
+import sys, warnings, mujoco, mjchair
+from mjchair.testlab.design import Design
+from mjchair.testlab.platform import Platform, Setup
+def angle():
+    return Platform(Design("manual"), Setup("rearward", stops=True)).tilt(0.02).angle
+first = angle()
+warnings.simplefilter("always")
+mjchair.load_spec() if {before == "reminder"} else mjchair.install()
+here = mujoco.get_mjcb_act_dyn()
+assert here is not None and angle() == first and mujoco.get_mjcb_act_dyn() == here
+print("the chair is stepped", file=sys.stderr)
+if {before == "reminder"}:
+    model = mjchair.load_spec().compile()
+    mujoco.mj_step(model, mujoco.MjData(model), nstep=5)
+"""
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert told.returncode == 0, told.stderr
+    on_platform, stepped = told.stderr.split("the chair is stepped")
+    assert on_platform == ""
+    assert ("without its tires" in stepped) is (before == "reminder"), "the true one comes"

@@ -27,7 +27,8 @@ SMALL = sweep.Study(
 
 
 def rows(table):
-    return table.to_pylist()
+    """The rows of a table; NaN as its name, since it is equal to nothing."""
+    return [{k: "nan" if v != v else v for k, v in row.items()} for row in table.to_pylist()]
 
 
 @pytest.fixture(scope="module")
@@ -134,6 +135,12 @@ def test_scenes_of_different_sizes_share_a_study():
         ("axes = {cambre = [0.1]}\nduration = 1.0", "did you mean 'camber'"),
         ("axes = {camber = []}\nduration = 1.0", "no list of values"),
         ("axes = {camber = [9.0]}\nduration = 1.0", "camber is 9 rad"),
+        ("axes = {axle_position = [0.0, 0.5]}\nduration = 1.0", "axle_position is 0.5 m"),
+        ('axes = {camber = ["3 kg"]}\nduration = 1.0', "its unit must be one of rad, deg"),
+        ('axes = {"surface_patch.coefficient" = [99]}\nduration = 1.0', "coefficient is 99; it"),
+        ("axes = {torque_left = [0, 3], push_left = [0, 5]}\nduration = 1.0", "both torque_*"),
+        ("axes = {seat_height = [0.5, 1.2]}\nduration = 1.0", "seat_height"),
+        ('axes = {anti_tippers = [false]}\nfixed = {model = "power"}\nduration = 1.0', "anti_tip"),
         ("axes = {camber = [0.1]}\nduration = -1.0", "duration is -1 s"),
         ("axes = {camber = [0.1]}", "has no 'duration'"),
         ("axes = {camber = [0.1", "not TOML"),
@@ -156,6 +163,38 @@ def test_bad_studies_get_one_line(study, message, tmp_path, capsys):
     assert main(["sweep", str(path), "--out", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err
     assert message in error and error.count("\n") == 1
+    assert not (tmp_path / "out").exists(), "a refused study leaves nothing in the way of the next"
+
+
+def test_a_refused_study_deletes_no_results(tmp_path, monkeypatch):
+    from mjchair.sweep import runner
+
+    def refusing(*given):
+        raise mjchair.MjchairError("no such chair")
+
+    fine = sweep.Study(axes={"speed": [0.5]}, duration=0.05)
+    before = rows(sweep.run(fine, tmp_path / "out"))
+    monkeypatch.setattr(runner, "run_chunk", refusing)
+    other = sweep.Study(axes={"speed": [0.6]}, duration=0.05)
+    for place, force in (("out", True), ("new", False)):
+        with pytest.raises(mjchair.MjchairError, match="no such chair"):
+            sweep.run(other, tmp_path / place, force=force)
+    assert rows(sweep.read(tmp_path / "out")) == before
+    assert not (tmp_path / "new").exists()
+
+
+def test_text_with_a_unit_is_a_number_in_the_table():
+    study = sweep.Study(axes={"camber": ["3deg", 0.1], "anti_tippers": ["no", True]}, duration=0.02)
+    found = chunk.run_chunk(study, study.cases())
+    assert [row["camber"] for row in found] == pytest.approx([np.radians(3.0)] * 2 + [0.1] * 2)
+    assert [float(row["anti_tippers"]) for row in found] == [0.0, 1.0, 0.0, 1.0]
+
+
+def test_energy_per_what_did_not_happen_is_not_a_number(small):
+    study = sweep.Study(axes={"speed": [0.0]}, duration=0.02)
+    (still,) = chunk.run_chunk(study, study.cases())
+    for name in ("energy_per_metre", "energy_per_radian", "deceleration"):
+        assert np.isnan(still[name]) and np.isfinite(small[-1][name])
 
 
 def test_the_command(tmp_path, capsys):

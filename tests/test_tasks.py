@@ -426,3 +426,47 @@ def test_a_recorded_episode_is_the_episode():
     weight = 9.81 * environment.physics.model.body_subtreemass[0]
     assert np.median(load_on_wheels) == pytest.approx(weight, rel=0.03)
     assert episode.replay().html.count("left_wheel_tire.Fy") >= 1
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (
+            {"task_kwargs": {"randm": 0}},
+            "option of the task 'randm'; did you mean 'random'",
+        ),
+        ({"task_kwargs": {"random": "a"}}, "random is 'a'; it must be a whole number"),
+        ({"task_kwargs": {"random": -1}}, "random is -1; it must be a whole number from 0"),
+        ({"environment_kwargs": {"flat_obs": True}}, "of the environment 'flat_obs'"),
+        ({"scene_kwargs": {"grad": 0.1}}, "option of the scene 'grad'; did you mean 'grade'"),
+        ({"pixels": {"height": 0}}, "height is 0; it must be a whole number, 1 to 4096 pixels"),
+        ({"pixels": {"width": 84.5}}, "width is 84.5; it must be a whole number"),
+        ({"pixels": {"heigth": 84}}, "option of pixels 'heigth'; did you mean 'height'"),
+        ({"pixels": {"camera_id": "folow"}}, "unknown camera 'folow'; did you mean 'follow'"),
+    ],
+)
+def test_a_wrong_option_gets_one_line(options, line):
+    with pytest.raises(mjchair.MjchairError) as refused:
+        tasks.load("slalom", **options)
+    assert line in str(refused.value) and "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("name", ["straight_line", "push", "power_slalom"])
+@pytest.mark.parametrize(
+    ("action", "line"),
+    [
+        ([np.nan, 0.0], " is nan; give 2 finite numbers: "),
+        ([0.0, np.inf], " is inf; give 2 finite numbers: "),
+        ([1.0], r"action has shape \(1,\); give 2"),
+        ([1.0, 2.0, 3.0], r"action has shape \(3,\); give 2"),
+        (["a", 1.0], r"action is \['a', 1.0\]; give 2"),
+    ],
+)
+def test_a_wrong_action_gets_one_line_with_the_name_of_the_component(name, action, line):
+    environment = tasks.load(name, {"random": 0}, visual_geoms=False)
+    environment.reset()
+    components = environment.action_spec().name.split("\t")
+    with pytest.raises(mjchair.MjchairError, match=line + ".*" + ", ".join(components)[-5:]):
+        environment.step(action)
+    environment.step([1e3, -1e3])  # beyond the bounds it is clipped, and the chair is whole
+    assert np.isfinite(environment.physics.data.qpos).all()

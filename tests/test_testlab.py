@@ -213,6 +213,21 @@ def test_the_sheet_opens_offline_and_says_what_is_missing():
     assert "http" not in page and "data:image/png" in page
 
 
+def test_a_note_and_an_interval_say_of_which_design_they_are():
+    def result(angle, note, same):
+        values = {
+            "rearward_locked": Value(angle, "deg", angle - 1.0, angle + 1.0, note=note),
+            "forward_locked": Value(20.0, "deg", note=same),
+        }
+        return {"static-stability": Result("static-stability", values)}
+
+    designs = {"old": result(10.0, "closed form 10.2 deg", "k"), "new": result(12.0, "13.1", "k")}
+    page = sheet.page("Chairs", [], designs)
+    assert "old: closed form 10.2 deg; new: 13.1" in page
+    assert "old: 9.0 to 11.0; new: 11.0 to 13.0" in page
+    assert '<td class="note">k</td>' in page, "what is the same of all is said once"
+
+
 def test_the_sheet_leads_to_the_replays_of_its_runs(tmp_path):
     assert cli.main(["test", "rolling", "--replays", "--workers", "1", "--out", str(tmp_path)]) == 0
     pages = sorted((tmp_path / "replays").iterdir())

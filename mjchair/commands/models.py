@@ -54,13 +54,13 @@ def _parameters() -> Iterator[str]:
     from dataclasses import fields
 
     from mjchair.model.parameters import ChairParameters
-    from mjchair.units import units_of
+    from mjchair.units import units_of, with_unit
 
     yield "chair parameters (--set NAME=VALUE; in study.toml a table [chair]; in Python"
     yield "load_spec(parameters={...})): SI, or with another unit, as camber=3deg"
     for item in fields(ChairParameters):
         unit, low, high = (item.metadata[key] for key in ("unit", "low", "high"))
-        told = unit if unit == "yes or no" else f"{low:g} to {high:g} {unit}"
+        told = unit if unit == "yes or no" else with_unit(f"{low:g} to {high:g}", unit)
         others = [u for u in units_of(unit) if u != unit]
         also = f" (also in {', '.join(others)})" if others else ""
         yield f"  {item.name:<16} {told:<18} {item.metadata['text']}{also}"

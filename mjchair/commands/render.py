@@ -27,7 +27,11 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
         "--slow", type=options.number, default=1.0, metavar="N", help="N times slower; default: 1"
     )
     parser.add_argument(
-        "--size", type=options.size, default=(960, 540), metavar="WxH", help="pixels; 960x540"
+        "--size",
+        type=options.size,
+        default=(960, 540),
+        metavar="WxH",
+        help="pixels, 48 to 4096; 960x540",
     )
     options.add_output(parser, "out/render")
     parser.set_defaults(run=run)
@@ -36,7 +40,7 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 def run(args: argparse.Namespace) -> int:
     """Film it."""
     from mjchair.errors import MjchairError
-    from mjchair.report.film import write_film, write_frame
+    from mjchair.report.film import check_size, write_film, write_frame
     from mjchair.simulation.recording import load_recording
     from mjchair.storage import check_vacant, output_folder
 
@@ -49,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
     if args.frame is not None and not 0.0 <= args.frame <= last:
         raise MjchairError(f"--frame is {args.frame:g} s; the recording goes from 0 to {last:g} s")
     width, height = args.size
+    check_size(width, height)
     name = "video.mp4" if args.frame is None else "frame.png"
     made = not Path(args.out).exists()
     folder = output_folder(args.out, args.force)

@@ -12,6 +12,7 @@ source; a number or a source that is missing, another unit, an unknown name is r
 
 from __future__ import annotations
 
+import json
 import os
 from dataclasses import fields
 from pathlib import Path
@@ -95,7 +96,11 @@ def _part(part: type[Part], given: dict[str, Stated], profile: str = "") -> Any:
             raise MjchairError(f"{where}: unknown {key!r}" + nearest(key, known))
     missing = [name for name in known if name not in given]
     if missing:
-        raise MjchairError(f"{where} has no {missing[0]!r}; it has {', '.join(known)}")
+        unit = known[missing[0]].metadata["unit"]
+        raise MjchairError(
+            f"{where} has no {' and no '.join(map(repr, missing))}; give it as "
+            f'{missing[0]} = {{ value = ..., unit = {json.dumps(unit)}, source = "..." }}'
+        )
     return part(**{key: _number(f"{where} {key}", given[key], known[key]) for key in known})
 
 

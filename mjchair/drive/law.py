@@ -80,6 +80,22 @@ def battery_current(power: float, voltage: float, resistance: float) -> float:
 
 
 @register_jitable(forceinline=True)
+def charge_current(current: float, used: float, charge: float, capacity: float, h: float) -> float:
+    """The part of a battery's current (A) that changes its charge, which stays within 0 to 1.
+
+    A full battery takes no more charge, and an empty one has no more to give.
+
+    Args:
+      used: charge taken since the start, A s. charge: at the start, 0 to 1. capacity: A s. h: s.
+    """
+    lowest, highest = (charge - 1.0) * capacity, charge * capacity
+    after = used + h * current
+    if lowest <= after <= highest:
+        return current
+    return (clip(after, lowest, highest) - used) / h
+
+
+@register_jitable(forceinline=True)
 def current_limit(
     boost: float,
     temperature: float,

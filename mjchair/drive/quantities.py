@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from mjchair.errors import MjchairError
+from mjchair.units import with_unit
 
 
 def quantity(unit: str, low: float, high: float, text: str) -> Any:
@@ -37,7 +38,7 @@ class Part:
                 ):
                     told = f"{number:g}" if isinstance(number, float | int) else repr(number)
                     raise MjchairError(
-                        f"{self.name()} {item.name} is {told} {unit}; it must be within "
+                        f"{self.name()} {item.name} is {with_unit(told, unit)}; it must be within "
                         f"{low:g} to {high:g}"
                     )
 

@@ -18,6 +18,7 @@ from typing import Any
 import mujoco
 
 from mjchair.errors import MjchairError, nearest
+from mjchair.units import with_unit
 
 Values = dict[str, float]
 Edit = Callable[..., None]
@@ -232,8 +233,8 @@ class Effect:
         )
         return replace(self, parameters=bounded)
 
-    def apply(self, spec: mujoco.MjSpec, values: Mapping[str, float]) -> None:
-        """Edit the specification in place.
+    def check(self, values: Mapping[str, float]) -> None:
+        """Refuse values that `apply` does not take.
 
         Raises:
           MjchairError: an unknown parameter, or a value outside its bounds.
@@ -247,9 +248,17 @@ class Effect:
             p = self.parameter(name)
             if not math.isfinite(value) or not p.low <= value <= p.high:
                 raise MjchairError(
-                    f"{self.name}: {name} is {value:g} {p.unit}; "
+                    f"{self.name}: {name} is {with_unit(value, p.unit)}; "
                     f"it must be within {p.low:g} to {p.high:g}"
                 )
+
+    def apply(self, spec: mujoco.MjSpec, values: Mapping[str, float]) -> None:
+        """Edit the specification in place.
+
+        Raises:
+          MjchairError: as `check` does, or the specification lacks what the effect is about.
+        """
+        self.check(values)
         self.edit(spec, **{**self.neutral(), **values})
 
 

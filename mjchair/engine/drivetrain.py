@@ -21,6 +21,7 @@ from mjchair.engine.views import DataView, ModelView
 
 DYN_USER = int(mjtDyn.mjDYN_USER)
 DRIVE, MOTOR = 1, 2
+EMPTY = 1e-9  # charge; rounding leaves less in an empty battery
 _C, _M = block.CONTROLLER, block.MOTOR
 
 RADIUS, TRACK = _C["radius"], _C["track"]
@@ -73,7 +74,7 @@ def battery_without_load(
     user: NDArray[np.float64], drive: int, used: float
 ) -> tuple[float, float, float]:
     """Charge (1), voltage without load (V) and internal resistance (ohm) of the battery."""
-    charge = user[drive, CHARGE] - used / user[drive, CAPACITY]
+    charge = law.clip(user[drive, CHARGE] - used / user[drive, CAPACITY], 0.0, 1.0)
     voltage = law.open_circuit(
         charge,
         user[drive, VOLTAGE],
@@ -82,8 +83,8 @@ def battery_without_load(
         user[drive, VOLTAGE + 3],
         user[drive, VOLTAGE + 4],
     )
-    empty = 1.0 - law.clip(charge, 0.0, 1.0)
-    return charge, voltage, user[drive, INTERNAL] * (1.0 + user[drive, GROWTH] * empty)
+    growth = user[drive, GROWTH] * (1.0 - charge)
+    return charge, voltage, user[drive, INTERNAL] * (1.0 + growth)
 
 
 @register_jitable(forceinline=True)
@@ -180,7 +181,7 @@ def act_dyn(m: ModelView, d: DataView, drive: int) -> None:
     y = act[at + Y] + filter_gain * (joystick_axis(m, d, drive - block.Y_BEFORE) - act[at + Y])
     ahead = law.joystick_demand(x, user[drive, DEADBAND], user[drive, CURVE])
     aside = law.joystick_demand(y, user[drive, DEADBAND], user[drive, CURVE])
-    if charge <= 0.0:  # an empty battery: as if the joystick were released
+    if charge <= EMPTY:  # an empty battery: as if the joystick were released
         ahead, aside = 0.0, 0.0
     speed, turn = act[at + SPEED], act[at + TURN]
     reference = ahead * (user[drive, FORWARD_SPEED] if ahead > 0.0 else user[drive, REVERSE_SPEED])
@@ -220,7 +221,9 @@ def act_dyn(m: ModelView, d: DataView, drive: int) -> None:
     rate[at + SPEED] = (new_speed - speed) / h
     rate[at + TURN] = (new_turn - turn) / h
     rate[at + AWAKE] = (awake - act[at + AWAKE]) / h
-    rate[at + USED] = current
+    rate[at + USED] = law.charge_current(
+        current, act[at + USED], user[drive, CHARGE], user[drive, CAPACITY], h
+    )
     rate[at + SAG] = (internal * current - act[at + SAG]) / h
     rate[at + CURRENT] = (current - act[at + CURRENT]) / h
 
@@ -244,7 +247,8 @@ def sense_drive(m: ModelView, d: DataView, drive: int, adr: int) -> None:
     out[adr + 3] = charge
     out[adr + 4] = source - (d.act[at + SAG] + h * d.act_dot[at + SAG])
     out[adr + 5] = current
-    out[adr + 6] = source * current
+    # what a full battery is charged with turns into heat
+    out[adr + 6] = source * (d.act_dot[at + USED] if current < 0.0 else current)
 
 
 @register_jitable(forceinline=True)

@@ -62,6 +62,17 @@ def uninstall() -> None:
 
 
 @contextmanager
+def uninstalled() -> Iterator[None]:
+    """No callbacks inside the block, nor the reminder; what was there before comes back."""
+    before = _current()
+    uninstall()
+    try:
+        yield
+    finally:
+        _put(*before)
+
+
+@contextmanager
 def installed(compiled: bool = True) -> Iterator[None]:
     """Callbacks in place inside the block; what was there before comes back, whatever happens."""
     before = _current()

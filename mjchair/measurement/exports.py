@@ -32,7 +32,7 @@ from mjchair.errors import MjchairError, nearest
 from mjchair.measurement.delimited import Delimited
 from mjchair.measurement.notes import Detail
 from mjchair.toml_file import read_toml
-from mjchair.units import UNITS, known
+from mjchair.units import UNITS, known, nearest_unit
 
 Array = NDArray[np.float64]
 
@@ -271,7 +271,7 @@ def _time(file: Delimited, form: Format, rate: float) -> Array:
 
 def _factor(unit: str, form: Format) -> float:
     if known(unit) not in UNITS:
-        raise MjchairError(f"mapping {form.name}: unknown unit {unit!r}" + nearest(unit, UNITS))
+        raise MjchairError(f"mapping {form.name}: unknown unit {unit!r}" + nearest_unit(unit))
     return UNITS[known(unit)][1]
 
 

@@ -15,11 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mjchair.errors import MjchairError, nearest
-from mjchair.units import quantity
+from mjchair.units import quantity, with_unit
 
 FLOOR = "floor"
 STEP = "step"  # the geom of the scenes `kerb` and `threshold`
 HIGHEST_STEP = 0.3  # m
+# of generated heights: rms and wavelength, m; a rolling floor is no staircase, nor finer than cells
+UNEVEN = {"rms": (0.0, 0.2), "wavelength": (0.1, 20.0), "seed": (0, 2**32 - 1)}
 FOOTPRINT = (1.0, 0.6)  # m, half lengths along x and y of what a chair stands on
 
 Array = NDArray[np.float64]
@@ -98,8 +100,12 @@ def _uneven_numbers(text: str) -> dict[str, float]:
         if name not in units or not equals:
             raise MjchairError(f"heights: {part!r} is not NAME=VALUE" + nearest(name, units))
         number = quantity(value, units[name], f"heights: {name}")
-        if not number >= 0.0 or (name == "wavelength" and number == 0.0):
-            raise MjchairError(f"heights: {name} is {number:g}; it must be positive")
+        low, high = UNEVEN[name]
+        if not low <= number <= high:
+            raise MjchairError(
+                f"heights: {name} is {with_unit(number, units[name])}; it must be within "
+                f"{low:g} to {high:g}" + ("; write mm, as rms=5mm" if name == "rms" else "")
+            )
         numbers[name] = int(number) if name == "seed" else number
     return numbers
 

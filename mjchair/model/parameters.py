@@ -16,7 +16,7 @@ import numpy as np
 from mjchair.errors import MjchairError, nearest
 from mjchair.model import edits, inertials, merged_visual_geoms, parts, seating
 from mjchair.tire import block
-from mjchair.units import quantity
+from mjchair.units import quantity, with_unit
 
 # Rolling resistance grows as pressure falls: steeply below half the recommended pressure
 # (PMC8049518; Sawatzky et al. 2005: 12 and 24 % more energy at 50 and 25 %, of which rolling is
@@ -105,7 +105,8 @@ class ChairParameters:
             if isinstance(value, bool | str) or not low <= value <= high:
                 told = f"{value:g}" if isinstance(value, float | int) else repr(value)
                 raise MjchairError(
-                    f"{item.name} is {told} {unit}; it must be within {_range(unit, low, high)}"
+                    f"{item.name} is {with_unit(told, unit)}; "
+                    f"it must be within {_range(unit, low, high)}"
                 )
 
     @staticmethod

@@ -25,6 +25,7 @@ from mjchair.diagnosis.result import (
     NamedEffect,
 )
 from mjchair.diagnosis.rules import LEVEL, LIKELY, PARTLY, PROBABLE, Verdict
+from mjchair.units import with_unit
 
 LEAST = 1e-6  # a chance below this is said to be below it
 # what a force may go with that is not known where nothing tells how the chair turns
@@ -96,7 +97,7 @@ def sensor_words(effect: NamedEffect) -> str:
         by = (
             f"{size(100.0 * abs(number.value))} %"
             if effect.name == "sensor_scale"
-            else f"{size(abs(number.value))} {number.unit}"
+            else with_unit(size(abs(number.value)), number.unit)
         )
         shows = f"shows {by} too {much}"
     what = ", ".join(_parameters(effect))
@@ -181,7 +182,7 @@ def process_words(diagnosis: Diagnosis) -> str:
     names |= {name: when for name, (when, _) in _clear_turns(diagnosis).items()}
     loudest = max(e.value for name, e in process.items() if name in names)
     levels = ", ".join(
-        f"{size(e.value) if e.value > FAINT * loudest else 0} {e.unit} {names[name]}"
+        f"{with_unit(size(e.value) if e.value > FAINT * loudest else '0', e.unit)} {names[name]}"
         for name, e in process.items()
         if name in names
     )

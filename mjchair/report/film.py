@@ -22,10 +22,10 @@ from mjchair.errors import MjchairError
 from mjchair.report import gl
 from mjchair.report.camera import camera_at, smooth_heading, stand_upright, view_named
 from mjchair.report.colours import FORCES, rgb
-from mjchair.report.film_legend import BAR, INK, WHITE, Scale, font, legend
+from mjchair.report.film_legend import BAR, INK, WHITE, Scale, font, is_narrow, legend
 from mjchair.report.forces import Array, WheelForces, wheel_forces
 from mjchair.report.slope_scenery import Box, build_ramp, grade_of
-from mjchair.simulation.initial import tire_geoms
+from mjchair.simulation.floor import tire_geoms
 from mjchair.simulation.recording import Recording, Status
 from mjchair.storage import atomic_file
 
@@ -37,7 +37,16 @@ LEAST = 0.02  # m; shorter arrows are not drawn
 OUTWARD = 0.10  # m, from the contact to where the arrows start, so that the wheel hides none
 LIFT = 0.02  # m, above the ground
 HALO = (240, 240, 240)  # about a number that stands in the picture
+SMALLEST, LARGEST = 48, 4096  # pixels, of a side of a frame
 DRAWN = 2.0  # MuJoCo draws an arrow half as long as the connector that it is given
+
+
+def check_size(width: int, height: int) -> None:
+    """Raise MjchairError unless a frame's width and height (pixels) can be drawn."""
+    if not (SMALLEST <= width <= LARGEST and SMALLEST <= height <= LARGEST):
+        raise MjchairError(
+            f"size is {width}x{height} pixels; each side must be {SMALLEST} to {LARGEST}"
+        )
 
 
 class DrawnArrow(NamedTuple):
@@ -60,7 +69,8 @@ class Film:
       scale: of the arrows.
 
     Raises:
-      MjchairError: an unknown view, or as mjchair.report.gl does.
+      MjchairError: an unknown view, a size out of SMALLEST to LARGEST, or as mjchair.report.gl
+        does.
     """
 
     def __init__(
@@ -72,6 +82,7 @@ class Film:
         scale: Scale | None = None,
     ) -> None:
         """Load the recorded model and take an OpenGL context."""
+        check_size(width, height)
         self.recording, self.view = recording, view_named(view)
         self.scale = scale or Scale()
         self.model = recording.model.load()
@@ -248,7 +259,8 @@ class Film:
         last = sample == self.recording.time.size - 1
         if last and self.recording.status is not Status.COMPLETED:
             text += f"  {self.recording.status.value}: {self.recording.reason}"
-        place = (round(0.02 * height), round(0.94 * height))
+        # where the legend is not
+        place = (round(0.02 * height), round((0.02 if is_narrow(*image.size) else 0.94) * height))
         draw.text(place, text, INK, font(height // 27))
         return np.asarray(image)
 
@@ -327,7 +339,8 @@ def write_film(
 
     if Path(path).suffix != ".mp4":
         raise MjchairError(f"{path}: a film is written as .mp4")
-    if width <= 0 or height <= 0 or width % 2 or height % 2:
+    check_size(width, height)
+    if width % 2 or height % 2:
         raise MjchairError(f"a frame of {width} x {height} pixels; H.264 needs even numbers")
     mediapy.set_ffmpeg(imageio_ffmpeg.get_ffmpeg_exe())
     wanted = samples_at(recording, fps, speed)

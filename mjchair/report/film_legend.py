@@ -19,6 +19,7 @@ BAR = 0.5  # m, of the white bar on the ground
 INK, PAPER = (20, 20, 20), (232, 234, 238, 215)
 NAMES = {"lateral": "lateral force", "longitudinal": "longitudinal force", "load": "load"}
 WHITE = (1.0, 1.0, 1.0)
+NARROW = 1.6  # width over height
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,11 @@ class Scale:
         return self.load if component == "load" else self.horizontal
 
 
+def is_narrow(width: int, height: int) -> bool:
+    """Whether a frame is so narrow that a legend at its upper left would hide the person's head."""
+    return width < NARROW * height
+
+
 def font(size: int) -> ImageFont.FreeTypeFont:
     """The font of frames, in pixels."""
     fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
@@ -44,7 +50,7 @@ def font(size: int) -> ImageFont.FreeTypeFont:
 
 
 def legend(width: int, height: int, scale: Scale, tires: bool, grade: float) -> Image.Image:
-    """The overlay (height, width) in pixels.
+    """The overlay (height, width) in pixels; along the bottom where the frame is narrow.
 
     Args:
       scale: of the arrows. tires: whether there are any. grade: of the floor, 0 is level.
@@ -55,7 +61,12 @@ def legend(width: int, height: int, scale: Scale, tires: bool, grade: float) -> 
         rows = [
             (f"{NAMES[c]}, {BAR * scale.newtons(c):g} N per bar", rgb(FORCES[c])) for c in NAMES
         ]
-        _box(draw, [*rows, (f"bar on the ground, {BAR:g} m", WHITE)], line, font(height // 30))
+        rows.append((f"bar on the ground, {BAR:g} m", WHITE))
+        if is_narrow(width, height):
+            line = min(line, width // 28)
+            _box(draw, rows, line, font(max(round(0.7 * line), 1)), 2, height)
+        else:
+            _box(draw, rows, line, font(height // 30))
     if grade:
         _slope(draw, width, line, grade, font(height // 30))
     return image
@@ -66,17 +77,22 @@ def _box(
     rows: Sequence[tuple[str, tuple[float, float, float]]],
     line: int,
     letters: ImageFont.FreeTypeFont,
+    columns: int = 1,
+    bottom: int | None = None,
 ) -> None:
-    """Draw rows with a colour and its meaning at the upper left."""
+    """Draw rows with a colour and its meaning at the upper left, or above a bottom (pixels)."""
+    many = math.ceil(len(rows) / columns)
     left = top = round(0.42 * line)
-    wide = max(draw.textlength(text, letters) for text, _ in rows)
-    box = (left, top, left + 1.9 * line + wide, top + len(rows) * line + 0.5 * line)
+    if bottom is not None:
+        top = bottom - top - round((many + 0.5) * line)
+    wide = 1.9 * line + max(draw.textlength(text, letters) for text, _ in rows)
+    box = (left, top, left + columns * wide, top + (many + 0.5) * line)
     draw.rounded_rectangle(box, radius=line // 4, fill=PAPER)
     for i, (text, colour) in enumerate(rows):
-        y = top + round((i + 0.25) * line)
-        swatch = (left + 0.35 * line, y + 0.35 * line, left + 1.35 * line, y + 0.65 * line)
+        x, y = left + (i // many) * wide, top + round((i % many + 0.25) * line)
+        swatch = (x + 0.35 * line, y + 0.35 * line, x + 1.35 * line, y + 0.65 * line)
         draw.rectangle(swatch, fill=tuple(round(255 * c) for c in colour))
-        draw.text((left + 1.6 * line, y), text, INK, letters)
+        draw.text((x + 1.6 * line, y), text, INK, letters)
 
 
 def _slope(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.engine.ground_contact import GroundContact, ground_contacts
-from mjchair.simulation.initial import tire_geoms
+from mjchair.simulation.floor import tire_geoms
 from mjchair.simulation.recording import Recording
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from mjchair.engine.ground_contact import ground_contacts
-from mjchair.simulation.initial import tire_geoms
+from mjchair.simulation.floor import tire_geoms
 from mjchair.simulation.recording import Recording
 from mjchair.simulation.table import Array
 

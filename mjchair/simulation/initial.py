@@ -21,6 +21,13 @@ from mjchair.engine import drivetrain
 from mjchair.errors import MjchairError, nearest
 from mjchair.model.wheels import wheels
 from mjchair.simulation import names
+from mjchair.simulation.floor import (
+    clearance,
+    floor_plane,
+    height_above,
+    on_field,
+    tire_geoms,
+)
 from mjchair.simulation.inputs import is_position
 from mjchair.simulation.settling import settle
 
@@ -193,19 +200,6 @@ def _release(model: mujoco.MjModel, data: mujoco.MjData) -> None:
         data.act[first] = data.act[first + 2] = 0.0
 
 
-def floor_plane(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Array, Array]:
-    """A point (3,) m and the upward normal (3,) of the plane geom `floor`; needs kinematics.
-
-    Raises:
-      MjchairError: there is no such plane.
-    """
-    for i, name in enumerate(names.geoms(model)):
-        plane = model.geom_type[i] == mujoco.mjtGeom.mjGEOM_PLANE
-        if plane and names.same(name, "floor"):
-            return data.geom_xpos[i].copy(), data.geom_xmat[i].reshape(3, 3)[:, 2].copy()
-    raise MjchairError("the model has no plane geom named floor; leave the initial place to it")
-
-
 def _chair(model: mujoco.MjModel) -> tuple[int, int, int, int]:
     """Body, qpos address and dof address of the free joint `chair`, and the site `axle`."""
     joint = names.find("chair", names.joints(model), "joint")
@@ -215,21 +209,24 @@ def _chair(model: mujoco.MjModel) -> tuple[int, int, int, int]:
     return body, int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint]), site
 
 
-def tire_geoms(model: mujoco.MjModel) -> dict[str, int]:
-    """Wheel name -> its tire geom (`<wheel>_tire`)."""
-    ending = "_tire"
-    named = {name: i for i, name in enumerate(names.geoms(model)) if name.endswith(ending)}
-    return {name.removesuffix(ending): i for name, i in named.items()}
-
-
 def _place(model: mujoco.MjModel, data: mujoco.MjData, initial: Initial) -> None:
     body, address, _, site = _chair(model)
     mujoco.mj_kinematics(model, data)
-    point, normal = floor_plane(model, data)
     forward = data.xmat[body].reshape(3, 3)[:, 0]
     heading = math.atan2(forward[1], forward[0]) if initial.heading is None else initial.heading
     xy = data.site_xpos[site][:2] if initial.position is None else np.asarray(initial.position)
+    if on_field(model):  # upright first: the ground under the wheels is there
+        _stand(model, data, xy, heading, np.array([0.0, 0.0, 1.0]))
+        _stand(model, data, xy, heading, floor_plane(model, data)[1])
+    _stand(model, data, xy, heading, floor_plane(model, data)[1])
+    data.qpos[address + 2] -= clearance(model, data, tire_geoms(model).values())
 
+
+def _stand(
+    model: mujoco.MjModel, data: mujoco.MjData, xy: Array, heading: float, normal: Array
+) -> None:
+    """Put site `axle` over xy (2,) m, the chair's z along a normal (3,), its origin at z = 0."""
+    _, address, _, site = _chair(model)
     x = np.array([math.cos(heading), math.sin(heading), 0.0])
     x[2] = -(normal @ x) / normal[2]
     x /= np.linalg.norm(x)
@@ -238,11 +235,6 @@ def _place(model: mujoco.MjModel, data: mujoco.MjData, initial: Initial) -> None
     data.qpos[address : address + 2] = xy - (rotation @ model.site_pos[site])[:2]
     data.qpos[address + 2] = 0.0
     mujoco.mj_kinematics(model, data)
-    gap = min(
-        (data.geom_xpos[i] - point) @ normal - _reach(model, data, i, normal)
-        for i in tire_geoms(model).values()
-    )
-    data.qpos[address + 2] -= gap / normal[2]
 
 
 def _shift(model: mujoco.MjModel, data: mujoco.MjData, xy: Array) -> None:
@@ -253,12 +245,6 @@ def _shift(model: mujoco.MjModel, data: mujoco.MjData, xy: Array) -> None:
     move = xy - data.site_xpos[site][:2]
     data.qpos[address : address + 2] += move
     data.qpos[address + 2] -= move @ normal[:2] / normal[2]
-
-
-def _reach(model: mujoco.MjModel, data: mujoco.MjData, geom: int, normal: Array) -> float:
-    """How far an ellipsoid reaches from its centre against the normal, m."""
-    axes = data.geom_xmat[geom].reshape(3, 3)
-    return float(np.linalg.norm(model.geom_size[geom] * (normal @ axes)))
 
 
 def _body_velocity(
@@ -303,10 +289,9 @@ def _set_velocities(model: mujoco.MjModel, data: mujoco.MjData, initial: Initial
     to_body = data.xpos[body] - data.site_xpos[site]
     data.qvel[dof : dof + 3] = velocity + np.cross(spin, to_body)
     data.qvel[dof + 3 : dof + 6] = data.xmat[body].reshape(3, 3).T @ spin
-    point, normal = floor_plane(model, data)
     known = names.joints(model)
     for wheel, geom in tire_geoms(model).items():
         hub, heading, _ = _wheel_motion(model, data, initial, geom)
-        radius = (data.geom_xpos[geom] - point) @ normal
+        radius = height_above(model, data, geom)
         joint = names.find(wheel, known, "joint")
         data.qvel[model.jnt_dofadr[joint]] = hub @ heading / radius

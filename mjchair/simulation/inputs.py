@@ -293,19 +293,20 @@ def read_inputs(path: str | os.PathLike[str], model: mujoco.MjModel, hold: bool 
         if name in JOYSTICK:
             raise MjchairError(
                 f"{path}: {name} is the joystick of a power chair's drive, and this chair has "
-                'none; build it with drive="normal" (--profile normal) or another profile'
+                'none; take a power chair with its drive, as load_spec("power", drive="normal") '
+                "(--model power --profile normal)"
             )
         if name in JOINT_NAMES:
             raise MjchairError(
                 f"{path}: {name} moves a joint of the rider, who is rigid here; build the chair "
                 'with rider="moving" (--rider moving)'
             )
+    possible = {*drivable(model), *sensed, *JOYSTICK}
     if unknown and not controls:
         raise MjchairError(
-            f"{path}: unknown channel {unknown[0]!r}"
-            + nearest(unknown[0], {*drivable(model), *sensed})
+            f"{path}: unknown channel {unknown[0]!r}" + nearest(unknown[0], possible)
         )
-    leave_out(unknown, {*drivable(model), *sensed}, str(path))
+    leave_out(unknown, possible, str(path))
     if not controls:
         raise MjchairError(
             f"{path}: no column drives an actuator; name one of {', '.join(drivable(model))}"

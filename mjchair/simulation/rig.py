@@ -30,6 +30,7 @@ from mjchair.model import assets
 from mjchair.model.wheels import check_timestep
 from mjchair.tire import Tire, law
 from mjchair.tire.paper import velocity_across, velocity_along
+from mjchair.units import with_unit
 
 Array = NDArray[np.float64]
 
@@ -48,7 +49,9 @@ HELD = 1e9  # kg m^2, armature of a wheel whose spin is prescribed
 
 def _check_range(name: str, value: float, low: float, high: float, unit: str) -> None:
     if not low <= value <= high:
-        raise MjchairError(f"{name} is {value:g} {unit}; it must be within {low:g} to {high:g}")
+        raise MjchairError(
+            f"{name} is {with_unit(value, unit)}; it must be within {low:g} to {high:g}"
+        )
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from mjchair.engine.install import installed
-from mjchair.errors import MjchairError
+from mjchair.errors import MjchairError, note
 from mjchair.model.engine_warnings import without_engine_warnings
 from mjchair.model.spec import compile_spec
 from mjchair.model.wheels import check_timestep
@@ -29,8 +29,9 @@ from mjchair.simulation.channels import channels, control_unit
 from mjchair.simulation.initial import Initial, as_initial, start
 from mjchair.simulation.inputs import Inputs, as_inputs, drivable
 from mjchair.simulation.recording import Recording, Status
-from mjchair.simulation.standing import fall_of_run
+from mjchair.simulation.standing import fall_of_run, leaning_on
 from mjchair.simulation.stored_model import StoredModel
+from mjchair.units import with_unit
 
 Array = NDArray[np.float64]
 
@@ -106,6 +107,9 @@ def simulate(
 
     with installed(compiled), without_engine_warnings():
         data = start(model, as_initial(initial), brakes, controls[0])
+        leaning = leaning_on(model, data)
+        if leaning:
+            note(leaning)
         states, sensed, reason = _run(model, data, controls, every, progress)
     made = assembled(model, stored, states, sensed, controls[::every], reason, every)
     return replace(made, hold=inputs is not None and inputs.hold)
@@ -114,7 +118,7 @@ def simulate(
 def check_positive(name: str, value: float, unit: str) -> None:
     """Raise MjchairError unless a value is positive and finite."""
     if not (np.isfinite(value) and value > 0.0):
-        raise MjchairError(f"{name} is {value:g} {unit}; it must be positive")
+        raise MjchairError(f"{name} is {with_unit(value, unit)}; it must be positive")
 
 
 def _steps(timestep: float, inputs: Inputs | None, duration: float | None) -> int:

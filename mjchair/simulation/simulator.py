@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from mjchair.drive.block import JOYSTICK
 from mjchair.engine.install import installed
-from mjchair.errors import MjchairError, nearest
+from mjchair.errors import MjchairError, nearest, note
 from mjchair.model.engine_warnings import without_engine_warnings
 from mjchair.model.spec import compile_spec
 from mjchair.model.wheels import base_name, check_timestep
@@ -43,6 +43,7 @@ from mjchair.simulation.simulate import (
     sound,
     steps_a_sample,
 )
+from mjchair.simulation.standing import leaning_on
 from mjchair.simulation.stored_model import StoredModel
 
 Array = NDArray[np.float64]
@@ -223,6 +224,9 @@ class Simulator:
         self._compiled, self._real_time = compiled, real_time
         with installed(compiled), without_engine_warnings():
             self.data = start(self.model, as_initial(initial), brakes)
+        leaning = leaning_on(self.model, self.data)
+        if leaning:
+            note(leaning)
         self._observer = Observer(self.model)
         self._to_chair = Messages(commands or Link())
         self._to_controller = Messages(observations or Link())

@@ -179,3 +179,26 @@ def load_places(model: mujoco.MjModel, chair: int) -> dict[str, int]:
         for wheel in wheels(model)
         if model.body_rootid[wheel.body] == chair and wheel.name + SUFFIX in sensors
     }
+
+
+def leaning_on(model: mujoco.MjModel, data: mujoco.MjData) -> str:
+    """In words, what a settled chair leans on beside its wheels, and which carry nothing; "": none.
+
+    Args:
+      data: after the last step of settling, with that step's contacts and forces.
+    """
+    joints = chair_joints(model)
+    roots = {int(model.jnt_bodyid[joint]) for joint in joints}
+    weight = float(model.body_subtreemass[0] * np.linalg.norm(model.opt.gravity))
+    known, touching, force = names.geoms(model), set(), np.zeros(6)
+    for i, contact in enumerate(data.contact):
+        mujoco.mj_contactForce(model, data, i, force)
+        of_chair = [g for g in contact.geom if model.body_rootid[model.geom_bodyid[g]] in roots]
+        if force[0] > LEAST * weight and len(of_chair) == 1:
+            touching |= {known[g] for g in of_chair if not known[g].endswith("_tire")}
+    if not touching:
+        return ""
+    loads = {w.name: data.act[model.actuator_actadr[w.actuator] + 3] for w in wheels(model)}
+    empty = [name for name, load in loads.items() if load <= LEAST * weight]
+    carry = f"; {' and '.join(empty)} {'carry' if len(empty) > 1 else 'carries'} 0 N"
+    return f"the chair starts leaning on {' and '.join(sorted(touching))}{carry if empty else ''}"

@@ -89,6 +89,26 @@ def _loaded_spec(options: str, digest: str) -> mujoco.MjSpec:
 @functools.lru_cache(maxsize=1024)
 def compiled_model(key: ChairKey) -> mujoco.MjModel:
     """The model of a chair on its floor, with the designer's parameters and effects of the case."""
+    model = compile_spec(without_visual_geoms(_edited_spec(key)))
+    cut_damping(model)
+    check(model)
+    return model
+
+
+def check_chairs(study: Study) -> None:
+    """Build a chair with each value of each axis, the other axes at their first values.
+
+    Raises:
+      MjchairError: a value that the chair does not take.
+    """
+    first = study.cases()[0]
+    cases = [{**first, name: value} for name, values in study.axes.items() for value in values]
+    for key in dict.fromkeys(chair_keys(cases or [first])):
+        _edited_spec(key)
+
+
+def _edited_spec(key: ChairKey) -> mujoco.MjSpec:
+    """The specification of `compiled_model`, before it is compiled."""
     case = json.loads(key.values)
     spec = _loaded_spec(_load_options(case), key.digest).copy()
     parameters = study_module.parameters(case)
@@ -96,10 +116,7 @@ def compiled_model(key: ChairKey) -> mujoco.MjModel:
         parameters.apply(spec)
     for name, values in study_module.effects(case).items():
         library.find(name).apply(spec, values)
-    model = compile_spec(without_visual_geoms(spec))
-    cut_damping(model)
-    check(model)
-    return model
+    return spec
 
 
 class StartState(NamedTuple):

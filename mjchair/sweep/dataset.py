@@ -31,11 +31,11 @@ class Dataset:
     """
 
     def __init__(self, folder: str | os.PathLike[str], study: Study, force: bool = False) -> None:
-        """Start a new folder, or continue one of the same study.
+        """Continue a folder of the same study, or begin a new one with the first results.
 
         Args:
           folder: made where it does not exist. study: the study whose results it holds.
-          force: delete the results of another study.
+          force: delete the results of another study, when there are new ones.
 
         Raises:
           MjchairError: the folder holds results of another study, or files of another kind.
@@ -44,30 +44,35 @@ class Dataset:
         self.table = self.folder / TABLE
         description = self.folder / DESCRIPTION
         fingerprint = study.fingerprint()
+        self._begun = False
+        self._about = {"fingerprint": fingerprint, "cases": len(study), "axes": list(study.axes)}
         if description.is_file():
             stored = _fingerprint(description)
-            if stored == fingerprint:
-                self.table.mkdir(exist_ok=True)
-                return
-            if not force:
+            self._begun = stored == fingerprint
+            if not (self._begun or force) and any(self.table.glob("*.parquet")):
                 changed = [part for part in fingerprint if stored.get(part) != fingerprint[part]]
                 raise MjchairError(
                     f"{self.folder} holds the results of another study (changed: "
                     f"{', '.join(changed)}); choose another --out, or delete them with --force"
                 )
-            for path in self.table.glob("*.parquet"):
-                path.unlink()
         elif self.folder.is_dir() and any(self.folder.iterdir()) and not force:
             raise MjchairError(
                 f"{self.folder} is not empty and does not belong to a sweep; choose another --out, "
                 "or use --force"
             )
+
+    def _begin(self) -> None:
+        """Make the folder of the study, empty but for its description, where it is not begun."""
         try:
             self.table.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise MjchairError(f"cannot make the folder {self.table}: {error.strerror}") from None
-        about = {"fingerprint": fingerprint, "cases": len(study), "axes": list(study.axes)}
-        write_whole(description, json.dumps(about, indent=1) + "\n")
+        if self._begun:
+            return
+        for path in self.table.glob("*.parquet"):
+            path.unlink()
+        write_whole(self.folder / DESCRIPTION, json.dumps(self._about, indent=1) + "\n")
+        self._begun = True
 
     def path(self, first: int) -> Path:
         """The file of the chunk that begins with case number `first`."""
@@ -75,7 +80,7 @@ class Dataset:
 
     def has(self, first: int) -> bool:
         """Whether the chunk that begins with case number `first` is written."""
-        return self.path(first).is_file()
+        return self._begun and self.path(first).is_file()
 
     def write(self, first: int, rows: Sequence[Mapping[str, Any]]) -> None:
         """Write the rows of a chunk, completely or not at all.
@@ -83,6 +88,7 @@ class Dataset:
         Args:
           first: number of the chunk's first case. rows: column -> value, a mapping for each case.
         """
+        self._begin()
         columns = list(dict.fromkeys(name for row in rows for name in row))
         table = pyarrow.table({name: _column([row.get(name) for row in rows]) for name in columns})
         with atomic_file(self.path(first)) as temporary:

@@ -65,9 +65,9 @@ def standard(sensed: Sensed) -> dict[str, float]:
       including full turns.
     - work: work of the drive torques. effort: time integral of their absolute values, both wheels.
     - energy_per_metre: work over distance; energy_per_radian: work over the absolute value of
-      `turned`. Infinite where the chair did not move or turn by more than 1e-3 (m, rad).
+      `turned`. NaN where the chair did not move or turn by more than 1e-3 (m, rad).
     - deceleration: (v0^2 - v1^2) / (2 distance), with the speeds at the start and at the end. For a
-      chair that coasts it is drag over mass.
+      chair that coasts it is drag over mass. NaN where it did not move by more than 1e-3 m.
     - mean_speed: forward speed. end_x, end_y: position at the end, world.
     - largest_slip_angle, least_load: over all four wheels, after the first 0.2 s.
     """
@@ -90,11 +90,11 @@ def standard(sensed: Sensed) -> dict[str, float]:
         "turned": turned,
         "work": work,
         "effort": effort,
-        "energy_per_metre": work / distance if distance > 1e-3 else math.inf,
-        "energy_per_radian": work / abs(turned) if abs(turned) > 1e-3 else math.inf,
+        "energy_per_metre": work / distance if distance > 1e-3 else math.nan,
+        "energy_per_radian": work / abs(turned) if abs(turned) > 1e-3 else math.nan,
         "deceleration": float(speed[0] ** 2 - speed[-1] ** 2) / (2.0 * distance)
         if distance > 1e-3
-        else math.inf,
+        else math.nan,
         "mean_speed": float(speed.mean()),
         "end_x": float(x[-1]),
         "end_y": float(y[-1]),

@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from mjchair.engine.install import installed
 from mjchair.errors import MjchairError
-from mjchair.sweep.chunk import run_chunk
+from mjchair.sweep.chunk import check_chairs, run_chunk
 from mjchair.sweep.dataset import Dataset, read
 from mjchair.sweep.study import Case, Study
 
@@ -59,6 +59,8 @@ def run(
         for first in range(0, len(cases), study.chunk)
     ]
     missing = [chunk for chunk in chunks if not dataset.has(chunk[0])]
+    if missing:
+        check_chairs(study)
     if scheduler is None:
         results = _in_this_process(study, missing, threads)
     else:

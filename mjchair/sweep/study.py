@@ -52,7 +52,7 @@ class Study:
     A case is a mapping of names to values. The names are:
 
     - options of load_spec: `model`, `scene`, `tire`, `grade`, `step`, `heights`;
-    - fields of ChairParameters (SI, or text with a unit such as "3 deg");
+    - fields of ChairParameters (SI, or text with a unit such as "3 deg", kept in SI);
     - parameters of effects, such as "surface_patch.coefficient" (see mjchair.effects);
     - the initial state: `speed` (m/s), `yaw_rate` (rad/s);
     - the inputs: constant torques `torque_left`, `torque_right` (N m), or push strokes with the
@@ -68,8 +68,8 @@ class Study:
       chunk: how many cases are simulated together; an interruption loses at most the current chunk.
 
     Raises:
-      MjchairError: an unknown name, a value of a wrong kind, an axis without values, or a duration
-        that is not positive.
+      MjchairError: an unknown name, a value of a wrong kind or out of its range, an axis without
+        values, torques beside push strokes, or a duration that is not positive.
     """
 
     axes: Mapping[str, Sequence[Value]]
@@ -92,11 +92,13 @@ class Study:
                 raise MjchairError(f"{name} is both an axis and a fixed value; remove one of them")
             if isinstance(values, (str, bool, int, float)) or not len(values):
                 raise MjchairError(f"axis {name} has no list of values; give [value, ...]")
-        every = {**self.axes, **{name: [value] for name, value in self.fixed.items()}}
-        for name, values in every.items():
-            if _is_known(name):
-                for value in values:
-                    _check_value(name, value)
+        axes = {k: [_checked(k, value) for value in values] for k, values in self.axes.items()}
+        object.__setattr__(self, "axes", axes)
+        object.__setattr__(self, "fixed", {k: _checked(k, v) for k, v in self.fixed.items()})
+        if self.inputs is None:
+            driven = [name for name in self.axes if name in DRIVEN]
+            for row in itertools.product(*(self.axes[name] for name in driven)):
+                _driven({**self.fixed, **dict(zip(driven, row, strict=True))})
 
     def __len__(self) -> int:
         """Number of cases."""
@@ -143,10 +145,26 @@ class Study:
         }
 
 
-def _check_value(name: str, value: Value) -> None:
+def _checked(name: str, value: Value) -> Value:
+    """A value in SI.
+
+    Raises:
+      MjchairError: it is of a wrong kind (text for a model, scene or tire, else a finite number),
+        or out of the range of a chair parameter or of an effect.
+    """
+    if not _is_known(name) or name == "heights":  # load_spec checks heights
+        return value
+    if name in DESIGNED:
+        return ChairParameters.of({name: value}).given()[name]
+    _check_kind(name, value)
+    effect, dot, parameter = name.partition(".")
+    if dot:
+        library.find(effect).check({parameter: float(value)})
+    return value
+
+
+def _check_kind(name: str, value: Value) -> None:
     """Refuse a value of a wrong kind: text for a model, scene or tire, else a finite number."""
-    if name == "heights" or (name in DESIGNED and isinstance(value, str)):
-        return  # load_spec and ChairParameters check these
     if name in TEXTS:
         if not isinstance(value, str):
             raise MjchairError(f"{name} is {value!r}; it must be a name or a path in quotes")
@@ -215,11 +233,8 @@ def drive(case: Case, duration: float) -> Inputs:
     Raises:
       MjchairError: the case has both torques and push strokes.
     """
-    torque = {f"{s}_wheel": float(case.get(f"torque_{s}", 0.0)) for s in ("left", "right")}
-    peak = {f"{s}_wheel": float(case.get(f"push_{s}", 0.0)) for s in ("left", "right")}
+    torque, peak = _driven(case)
     spread = float(case.get("push_spread", 0.0))
-    if any(peak.values()) and any(torque.values()):
-        raise MjchairError("a case has both torque_* and push_*; give only one of them")
     if not any(peak.values()):
         return constant(torque, duration)
     pushes = push_strokes(peak, duration)
@@ -232,6 +247,19 @@ def drive(case: Case, duration: float) -> Inputs:
         for name, values in pushes.controls.items()
     }
     return Inputs(pushes.time, controls, "push strokes")
+
+
+def _driven(case: Case) -> tuple[dict[str, float], dict[str, float]]:
+    """The constant torques and the peaks of the push strokes of a case, wheel -> N m.
+
+    Raises:
+      MjchairError: the case has both.
+    """
+    torque = {f"{s}_wheel": float(case.get(f"torque_{s}", 0.0)) for s in ("left", "right")}
+    peak = {f"{s}_wheel": float(case.get(f"push_{s}", 0.0)) for s in ("left", "right")}
+    if any(peak.values()) and any(torque.values()):
+        raise MjchairError("a case has both torque_* and push_*; give only one of them")
+    return torque, peak
 
 
 class _StudyEntry(Struct, forbid_unknown_fields=True):

@@ -13,6 +13,7 @@ from dm_env import specs
 from numpy.typing import NDArray
 
 from mjchair.drive import block
+from mjchair.tasks.given import checked_action
 from mjchair.tasks.physics import Physics
 from mjchair.tasks.quantity import Quantity
 from mjchair.tasks.task import ChairTask
@@ -56,6 +57,11 @@ class JoystickTask(ChairTask):
         return specs.BoundedArray((2,), np.float64, -most, most, "\t".join(block.JOYSTICK))
 
     def before_step(self, action: Any, physics: Physics) -> None:
-        """Set the joystick. The controls of tires, motors and wheels stay 0."""
-        for axis, deflection in zip(block.JOYSTICK, np.asarray(action), strict=True):
+        """Set the joystick. The controls of tires, motors and wheels stay 0.
+
+        Raises:
+          MjchairError: as ChairTask does.
+        """
+        given = checked_action(action, self.action_spec(physics))
+        for axis, deflection in zip(block.JOYSTICK, given, strict=True):
             physics.named.data.ctrl[axis] = np.clip(deflection, -1.0, 1.0)

@@ -6,17 +6,21 @@ observed quantities.
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import dm_env
 import mujoco
+from dm_control.mujoco import engine
 
 from mjchair.errors import MjchairError, nearest
+from mjchair.model.spec import load_spec
 from mjchair.tasks import (
     arena,
     follow_path,
+    given,
     power_doorway,
     power_slalom,
     push,
@@ -27,6 +31,7 @@ from mjchair.tasks import (
 )
 from mjchair.tasks.environment import Environment
 from mjchair.tasks.task import ChairTask
+from mjchair.units import with_unit
 
 
 @dataclass(frozen=True)
@@ -86,9 +91,11 @@ def load(
       scene_kwargs: options of load_spec (scene, grade, tilt, tire, ...), for follow_path.
 
     Raises:
-      MjchairError: an unknown name, or pixels with visual_geoms=False.
+      MjchairError: an unknown name of a task, an option or a camera, no seed, a size that cannot
+        be drawn, or pixels with visual_geoms=False.
     """
     entry = find(name)
+    _check_options(entry, task_kwargs or {}, environment_kwargs or {}, scene_kwargs or {})
     if pixels and not visual_geoms:
         raise MjchairError("pixels need the visual geoms; remove visual_geoms=False")
     physics = arena.physics(entry.spec(**dict(scene_kwargs or {})), visual_geoms)
@@ -103,11 +110,26 @@ def load(
     from dm_control.suite.wrappers.pixels import Wrapper
 
     chosen = {"height": 84, "width": 84, "camera_id": "follow"}
-    return Wrapper(
-        environment,
-        pixels_only=False,
-        render_kwargs={**chosen, **(pixels if isinstance(pixels, Mapping) else {})},
-    )
+    chosen |= pixels if isinstance(pixels, Mapping) else {}
+    model = physics.model
+    given.check_names("option of pixels", chosen, engine.Physics.render, "self")
+    given.check_picture(chosen, [model.id2name(i, "camera") for i in range(model.ncam)])
+    return Wrapper(environment, pixels_only=False, render_kwargs=chosen)
+
+
+def _check_options(
+    entry: Entry,
+    task: Mapping[str, Any],
+    environment: Mapping[str, Any],
+    scene: Mapping[str, Any],
+) -> None:
+    """Refuse options that a task does not have."""
+    given.check_names("option of the task", task, entry.task)
+    given.check_seed(task.get("random"))
+    given.check_names("option of the environment", environment, Environment, "physics", "task")
+    if scene:
+        free = "options" in inspect.signature(entry.spec).parameters
+        given.check_names("option of the scene", scene, load_spec if free else entry.spec)
 
 
 def find(name: str) -> Entry:
@@ -128,7 +150,7 @@ def describe(name: str) -> str:
       MjchairError: there is no task of that name.
     """
     lines = [
-        f"{q.name} {q.shape} {q.unit} [{q.low}, {q.high}]: {q.text}"
+        f"{with_unit(f'{q.name} {q.shape}', q.unit)} [{q.low}, {q.high}]: {q.text}"
         for q in find(name).task(random=0).quantities
     ]
     return "\n".join(lines)

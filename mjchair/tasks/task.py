@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from mjchair.simulation.initial import Initial, start
 from mjchair.simulation.standing import Fall
+from mjchair.tasks.given import checked_action
 from mjchair.tasks.physics import REAR, Physics
 from mjchair.tasks.quantity import COMMON, Quantity
 from mjchair.tasks.standing_watch import StandingWatch
@@ -92,8 +93,13 @@ class ChairTask(base.Task):  # type: ignore[misc]
         physics.place(*self._settled, x, y, heading)
 
     def before_step(self, action: Any, physics: Physics) -> None:
-        """Set the wheel torques. The controls of the tires have no effect and stay 0."""
-        for wheel, torque in zip(REAR, self.torques(np.asarray(action), physics), strict=True):
+        """Set the wheel torques. The controls of the tires have no effect and stay 0.
+
+        Raises:
+          MjchairError: the action is not two finite numbers; beyond its bounds it is clipped.
+        """
+        given = checked_action(action, self.action_spec(physics))
+        for wheel, torque in zip(REAR, self.torques(given, physics), strict=True):
             physics.named.data.ctrl[wheel] = torque
 
     def torques(self, action: Array, physics: Physics) -> Array:

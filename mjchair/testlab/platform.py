@@ -13,14 +13,14 @@ the tire forces of mjchair.engine hold the chair, and it may slide.
 from __future__ import annotations
 
 import math
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjchair.engine.install import installed
+from mjchair.engine.install import installed, uninstalled
 from mjchair.errors import MjchairError
 from mjchair.model.spec import compile_spec
 from mjchair.simulation.initial import lock_wheels
@@ -183,7 +183,8 @@ class Platform:
         frame = int(model.jnt_dofadr[model.body_jntadr[parts(model).chair]])
         model.dof_damping[[frame, frame + 1, frame + 5]] = HELD  # wheels have no friction
         for _ in range(round(REST_TIME / (50 * model.opt.timestep))):
-            mujoco.mj_step(model, data, nstep=50)
+            with uninstalled():
+                mujoco.mj_step(model, data, nstep=50)
             if np.abs(data.qvel).max() < 0.01 * REST:
                 break
         model.dof_damping[:] = held
@@ -242,7 +243,7 @@ class Platform:
         model.dof_armature[model.jnt_dofadr[held_joints]] = LOCKED
 
     def _callbacks(self) -> AbstractContextManager[object]:
-        return nullcontext() if self.setup.stops else installed()
+        return uninstalled() if self.setup.stops else installed()
 
     def load(self, names: tuple[str, ...]) -> float:
         """Share of the weight that these wheels carry."""

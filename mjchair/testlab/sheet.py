@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import io
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -97,12 +97,20 @@ def _rows(test: str, designs: Mapping[str, Mapping[str, Result]]) -> list[dict[s
                 "name": key.replace("_", " "),
                 "unit": first.unit,
                 "cells": ["" if c is None else number(c.value, c.unit) for c in cells],
-                "interval": "" if cells[0] is None else interval(cells[0]),
-                "note": first.note,
+                "interval": _each(designs, [interval(c) if c else "" for c in cells]),
+                "note": _each(designs, [c.note if c else "" for c in cells]),
                 "source": first.source,
             }
         )
     return rows
+
+
+def _each(designs: Iterable[str], texts: Sequence[str]) -> str:
+    """What is said of every design, or of each by its name where it is not the same of all."""
+    if len(set(texts)) == 1:
+        return texts[0]
+    named = zip(designs, texts, strict=True)
+    return "; ".join(f"{name}: {text}" for name, text in named if text)
 
 
 def page(
@@ -124,17 +132,18 @@ def page(
         lstrip_blocks=True,
     )
     environment.filters["number"] = number
-    first = next(iter(designs.values()))
     tests: list[dict[str, Any]] = []
     for test, (_, heading) in TESTS.items():
-        result = first.get(test) or next((d[test] for d in designs.values() if test in d), None)
-        if result is None:
+        shown = next((name for name, results in designs.items() if test in results), None)
+        if shown is None:
             continue
+        result = designs[shown][test]
         tests.append(
             {
                 "name": test,
                 "heading": heading,
                 "result": result,
+                "of": shown if len(designs) > 1 else "",
                 "rows": _rows(test, designs),
                 "picture": picture(result),
                 "replays": [r for r in replays if Path(r).name.startswith(f"{test}-")],

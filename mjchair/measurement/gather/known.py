@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mjchair.errors import MjchairError, nearest
+from mjchair.units import with_unit
 
 FLOORS = ("overground", "treadmill", "rollers")
 RANGES = {  # name -> unit, least, most
@@ -55,7 +56,7 @@ class Known:
                 flag = f"--{name.replace('_', '-')}"
                 hint = "; is it in mm?" if name == "wheel_radius" and value > 100.0 else ""
                 raise MjchairError(
-                    f"{flag} is {value:g} {unit}; it must be {low:g} to {high:g}{hint}"
+                    f"{flag} is {with_unit(value, unit)}; it must be {low:g} to {high:g}{hint}"
                 )
         if self.floor is not None and self.floor not in FLOORS:
             raise MjchairError(f"unknown floor {self.floor!r}" + nearest(self.floor, FLOORS))
