@@ -265,7 +265,7 @@ CASES = {
             "columns": {f"{s}_wheel_speed": PUSH / 0.3 for s in SIDES}
             | {f"{s}_wheel": -8.0 - PULL for s in SIDES}
         },
-        "left_wheel and right_wheel brake whenever the chair gains speed there",
+        "it gains speed the more they brake: positive torque drives forward",
     ),
     "an unknown nuisance": (
         {"columns": coast(), "head": HEAD + "[nuisance]\nmas = 0.1\n"},

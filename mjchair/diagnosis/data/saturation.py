@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mjchair.diagnosis.data.study import Study
+from mjchair.diagnosis.data.trial_checks import STAYS
 from mjchair.measurement.trial import Trial
 from mjchair.simulation.table import Array
 
@@ -23,7 +24,8 @@ def notes(study: Study) -> list[str]:
 
 
 def _of_run(trial: Trial, torque_measured: bool) -> list[str]:
-    columns = {name: trial.samples(name)[1] for name in trial.channels}
+    rates = [n for n in trial.channels if not n.endswith(tuple(STAYS))]  # a chair may stop
+    columns = {name: trial.samples(name)[1] for name in rates}
     if torque_measured and trial.inputs is not None:
         torques = {f"torque of {n}": trial.inputs.samples(n)[1] for n in trial.inputs.controls}
         columns |= torques

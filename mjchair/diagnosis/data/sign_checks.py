@@ -152,32 +152,26 @@ def _torque(trial: Trial, inputs: Inputs, axle: RearAxle, mass: float) -> list[s
       MjchairError: it gains speed besides while they brake, which no slope explains.
     """
     taken = lost = 0.0
-    seen, against = forward(trial, axle), []
+    seen, pulls = forward(trial, axle), []
     for side in SIDES:
         speeds = (seen.get(f"{side}_wheel_{kind}") for kind in ("speed", "angle"))
         story = next((s for s in speeds if s is not None and s.time.size >= 8), None)
         if story is None or f"{side}_wheel" not in inputs.controls:
             continue
         torque = at(Story(*averaged(*inputs.samples(f"{side}_wheel")), ""), story.time)
-        speed = story.values
-        takes = -float(np.trapezoid(torque * speed, story.time)) / axle.radius(side)
-        had = 0.25 * mass * float(speed[:3].mean() ** 2 - speed[-3:].mean() ** 2)
-        if takes > 0.5 * WORK + max(had, 0.0) and _brakes_as_it_gains(story, torque):
-            against.append(f"{side}_wheel")
-        taken, lost = taken + takes, lost + had
-    if against:
-        names, one = " and ".join(against), len(against) == 1
-        raise MjchairError(
-            f"{trial.name}: {names} {'brakes' if one else 'brake'} whenever the chair gains speed "
-            f"there, and {'takes' if one else 'take'} {taken:.0f} J in all: positive torque drives "
-            f"forward; turn the sign of {'its' if one else 'their'} torque, or of the wheel"
-        )
+        taken -= float(np.trapezoid(torque * story.values, story.time)) / axle.radius(side)
+        ends = story.values[:3].mean(), story.values[-3:].mean()
+        lost += 0.25 * mass * float(ends[0] ** 2 - ends[1] ** 2)
+        pulls.append((story, torque))
     if taken < WORK + max(lost, 0.0):
         return []
-    return [
-        f"{trial.name}: its torques take {taken:.0f} J from the chair, which had {lost:.0f} J to "
-        "lose: positive torque drives forward; turn their signs, unless the way goes downhill"
-    ]
+    said = f"{trial.name}: its torques take {taken:.0f} J from the chair, which had {lost:.0f} J to"
+    if all(_brakes_as_it_gains(story, torque) for story, torque in pulls):
+        raise MjchairError(
+            f"{said} lose, and it gains speed the more they brake: positive torque drives forward; "
+            "turn their signs"
+        )
+    return [f"{said} lose: positive torque drives forward; turn their signs, unless it goes down"]
 
 
 def _brakes_as_it_gains(story: Story, torque: Array) -> bool:
