@@ -15,7 +15,7 @@ from mjchair.simulation.table import Array
 
 SHARE = 0.02  # of the samples, at the end, from which on it is said (assumption)
 VALUES = 30  # different values of a column at least: one that has fewer is coarse
-PILE = 10.0  # times as often as another value is seen (median)
+PILE = 10.0  # times as often as other values are seen (median), and as the value next to it
 
 
 def notes(study: Study) -> list[str]:
@@ -49,5 +49,9 @@ def _ends(values: Array) -> list[float]:
     if seen.size < VALUES:
         return []
     enough = max(SHARE * values.size, PILE * float(np.median(counts)))
-    ends = ((seen[-1], counts[-1]), (seen[0], counts[0]))
-    return [float(v) for v, n in ends if v != 0.0 and n > enough]
+    ends = ((-1, -2), (0, 1))  # the largest and the least value, and those next to them
+    return [
+        float(seen[end])
+        for end, beside in ends
+        if seen[end] != 0.0 and counts[end] > max(enough, PILE * counts[beside])
+    ]
