@@ -78,11 +78,11 @@ def run(args: argparse.Namespace) -> int:
     force = args.force or _interrupted(kept)
     check_vacant(args.out, force)
     study = read_study(args.study)
-    for note in study.notes:  # some ask for a change, which minutes should not be waited for
-        print(f"note: {note}", file=sys.stderr)
     effects = [user_file.from_file(path) for path in args.effect]
     for effect in effects:
         user_file.check(effect, study.spec)
+    for note in study.notes:  # some ask for a change, which minutes should not be waited for
+        print(f"note: {note}", file=sys.stderr)
     folder = output_folder(args.out, force)
     with only_writer(kept):
         try:
