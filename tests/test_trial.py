@@ -105,7 +105,10 @@ def test_files_of_one_trial_share_a_clock_and_keep_their_rates_and_units(tmp_pat
             "rolls by the wheel's radius",
         ),
         ("imu_gyro.z [m/s^2]", "imu_gyro.z is in m/s^2; it must be in rad/s or deg/s or rpm"),
-        ("left_wheel [deg/s]", "left_wheel is in deg/s; it must be in N m or Nm or N cm or Ncm or N mm or Nmm"),
+        (
+            "left_wheel [deg/s]",
+            "left_wheel is in deg/s; it must be in N m or Nm or N cm or Ncm or N mm or Nmm",
+        ),
         ("rider_motion [deg]", "rider_motion is in deg; it must be in m or mm or cm or in"),
     ],
 )
