@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mjchair.commands import options
-from mjchair.errors import MjchairError
+from mjchair.errors import MjchairError, note
 
 if TYPE_CHECKING:
     from mjchair.diagnosis.data.study import Study
@@ -81,8 +81,8 @@ def run(args: argparse.Namespace) -> int:
     effects = [user_file.from_file(path) for path in args.effect]
     for effect in effects:
         user_file.check(effect, study.spec)
-    for note in study.notes:  # some ask for a change, which minutes should not be waited for
-        print(f"note: {note}", file=sys.stderr)
+    for line in study.notes:  # some ask for a change, which minutes should not be waited for
+        note(line)
     folder = output_folder(args.out, force)
     with only_writer(kept):
         try:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from mjchair.measurement.sensors import limit_of, sensor
+from mjchair.measurement.stretches import stretches
 from mjchair.measurement.torque import TORQUE
 from mjchair.measurement.trial import Trial
 from mjchair.model.rolling import RearAxle
@@ -167,10 +168,9 @@ def _coded(time: Array, values: Array, least: float) -> list[tuple[int, int]]:
 
 def _repeated(time: Array, values: Array) -> list[tuple[int, int]]:
     """The parts in which a channel repeats one value for HELD and for HELD_SAMPLES."""
-    edges = np.flatnonzero(np.diff(np.r_[False, np.diff(values) == 0.0, False].astype(int)))
     return [
-        (int(a), int(b))
-        for a, b in zip(edges[::2], edges[1::2], strict=True)
+        (a, b)
+        for a, b in stretches(np.diff(values) == 0.0)
         if b - a >= HELD_SAMPLES and time[b] - time[a] >= HELD
     ]
 

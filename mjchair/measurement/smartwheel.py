@@ -27,6 +27,7 @@ from mjchair.errors import MjchairError
 from mjchair.measurement import encoder
 from mjchair.measurement.delimited import read_delimited
 from mjchair.measurement.notes import Detail, about
+from mjchair.measurement.stretches import stretches
 from mjchair.measurement.trial import Trial
 from mjchair.simulation.inputs import Inputs
 from mjchair.simulation.table import frozen
@@ -250,8 +251,7 @@ def at_its_end(run: PushRim) -> list[str]:
         away = np.abs(values - np.median(values)) > AWAY * np.ptp(values)
         for end in (float(values.max()), float(values.min())):
             at = (values == end) & away
-            edges = np.flatnonzero(np.diff(np.r_[False, at, False].astype(int)))
-            longest = max((edges[1::2] - edges[::2]).tolist(), default=0)
+            longest = max((after - first for first, after in stretches(at)), default=0)
             if at.mean() >= ENDS and longest >= IN_A_ROW:
                 unit = "N" if name.startswith("F") else "N m"
                 out.append(

@@ -19,6 +19,7 @@ from scipy.signal import savgol_filter
 from mjchair.errors import MjchairError
 from mjchair.measurement.markers import SMOOTH, Markers
 from mjchair.measurement.notes import Detail
+from mjchair.measurement.stretches import stretches
 from mjchair.motion.marker_set import MarkerSet
 
 Array = NDArray[np.float64]
@@ -121,8 +122,7 @@ def _rate(time: Array, center: Array) -> Array:
     out = np.full(center.shape, np.nan)
     step = float(np.median(np.diff(time)))
     width = 2 * max(2, round(SMOOTH / step)) + 1
-    edges = np.flatnonzero(np.diff(np.r_[False, np.isfinite(center[:, 0]), False].astype(int)))
-    for a, b in zip(edges[::2], edges[1::2], strict=True):
+    for a, b in stretches(np.isfinite(center[:, 0])):
         if b - a >= width:
             out[a:b] = savgol_filter(center[a:b], width, 2, deriv=1, delta=step, axis=0)
     return out

@@ -216,26 +216,22 @@ def _candidates(diagnosis: Diagnosis) -> Table:
         Head("gain left out (chi²)", True),
     ]
     leading = candidates.leading(diagnosis, CANDIDATES)
-    lines = [_candidate(c) for c in leading]
-    if any(c.closure for c in leading):
-        heads.append(Head("closes", True))
-        lines = [[*cells, f"{c.closure:.0%}"] for cells, c in zip(lines, leading, strict=True)]
-    if chosen:
-        heads.append(Head("|cos|", True))
-        lines = [[*cells, f"{c.collinear:.2f}"] for cells, c in zip(lines, leading, strict=True)]
-    rows = [
-        Row(cells, (c.name, c.channel) in chosen) for cells, c in zip(lines, leading, strict=True)
-    ]
+    closes, alike = any(c.closure for c in leading), bool(chosen)
+    heads += [Head("closes", True)] * closes + [Head("|cos|", True)] * alike
+    rows = [Row(_candidate(c, closes, alike), (c.name, c.channel) in chosen) for c in leading]
     return Table(heads, rows)
 
 
-def _candidate(c: Candidate) -> list[str]:
+def _candidate(c: Candidate, closes: bool, alike: bool) -> list[str]:
+    """Cells of an effect, with the share that it closes and its likeness where these are shown."""
     on = f" ({c.channel})" if c.channel else ""
     return [
         diagnosis_words.plain_name(c.name) + on,
         _signature(c),
         f"{c.detectability:.1f}",
         f"{c.held_out_gain:,.0f}",
+        *([f"{c.closure:.0%}"] if closes else []),
+        *([f"{c.collinear:.2f}"] if alike else []),
     ]
 
 

@@ -37,15 +37,15 @@ LEAST = 0.02  # m; shorter arrows are not drawn
 OUTWARD = 0.10  # m, from the contact to where the arrows start, so that the wheel hides none
 LIFT = 0.02  # m, above the ground
 HALO = (240, 240, 240)  # about a number that stands in the picture
-SMALLEST, LARGEST = 48, 4096  # pixels, of a side of a frame
+SMALLEST = 48  # pixels, of a side of a frame
 DRAWN = 2.0  # MuJoCo draws an arrow half as long as the connector that it is given
 
 
 def check_size(width: int, height: int) -> None:
     """Raise MjchairError unless a frame's width and height (pixels) can be drawn."""
-    if not (SMALLEST <= width <= LARGEST and SMALLEST <= height <= LARGEST):
+    if not (SMALLEST <= width <= gl.LARGEST and SMALLEST <= height <= gl.LARGEST):
         raise MjchairError(
-            f"size is {width}x{height} pixels; each side must be {SMALLEST} to {LARGEST}"
+            f"size is {width}x{height} pixels; each side must be {SMALLEST} to {gl.LARGEST}"
         )
 
 
@@ -69,7 +69,7 @@ class Film:
       scale: of the arrows.
 
     Raises:
-      MjchairError: an unknown view, a size out of SMALLEST to LARGEST, or as mjchair.report.gl
+      MjchairError: an unknown view, a size out of SMALLEST to `gl.LARGEST`, or as mjchair.report.gl
         does.
     """
 

@@ -16,6 +16,7 @@ from typing import Any
 from mjchair.errors import MjchairError
 
 OFFSCREEN = ("egl", "osmesa")
+LARGEST = 4096  # pixels, of a side of a picture
 MISSING = (
     "no offscreen OpenGL: install one with `apt-get install libosmesa6` (or libegl1 with "
     "libgl1-mesa-dri); everything but pictures works without"

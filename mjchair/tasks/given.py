@@ -14,9 +14,9 @@ from dm_env import specs
 from numpy.typing import NDArray
 
 from mjchair.errors import MjchairError, nearest
+from mjchair.report.gl import LARGEST
 
 Array = NDArray[np.float64]
-LARGEST = 4096  # pixels, of a side of a picture
 
 
 def check_names(what: str, given: Iterable[str], function: Callable[..., Any], *own: str) -> None:

@@ -119,9 +119,7 @@ def _moment_shares(inputs: Inputs, story: Story) -> Array:
     grid, rate = story.time, story.values
     if grid.size < 8 or np.sqrt(np.mean(rate**2)) < YAW:
         return np.zeros(2)
-    left, right = (
-        at(Story(*averaged(*inputs.samples(f"{side}_wheel")), ""), grid) for side in SIDES
-    )
+    left, right = (_torque_at(inputs, side, grid) for side in SIDES)
     moment = right - left
     causes = np.column_stack([np.gradient(rate, grid), rate])
     shares = np.linalg.lstsq(causes, moment, rcond=None)[0]
@@ -158,7 +156,7 @@ def _torque(trial: Trial, inputs: Inputs, axle: RearAxle, mass: float) -> list[s
         story = next((s for s in speeds if s is not None and s.time.size >= 8), None)
         if story is None or f"{side}_wheel" not in inputs.controls:
             continue
-        torque = at(Story(*averaged(*inputs.samples(f"{side}_wheel")), ""), story.time)
+        torque = _torque_at(inputs, side, story.time)
         taken -= float(np.trapezoid(torque * story.values, story.time)) / axle.radius(side)
         ends = story.values[:3].mean(), story.values[-3:].mean()
         lost += 0.25 * mass * float(ends[0] ** 2 - ends[1] ** 2)
@@ -171,7 +169,15 @@ def _torque(trial: Trial, inputs: Inputs, axle: RearAxle, mass: float) -> list[s
             f"{said} lose, and it gains speed the more they brake: positive torque drives forward; "
             "turn their signs"
         )
-    return [f"{said} lose: positive torque drives forward; turn their signs, unless it goes down"]
+    return [
+        f"{said} lose: positive torque drives forward; turn their signs, unless the way goes "
+        "downhill"
+    ]
+
+
+def _torque_at(inputs: Inputs, side: str, time: Array) -> Array:
+    """The torque of a rear wheel, averaged as channels are, at times (n,), s; N m."""
+    return at(Story(*averaged(*inputs.samples(f"{side}_wheel")), ""), time)
 
 
 def _brakes_as_it_gains(story: Story, torque: Array) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from mjchair.measurement.stretches import stretches
 from mjchair.measurement.trial import Trial
 
 Array = NDArray[np.float64]
@@ -37,7 +38,7 @@ def still_stretches(trial: Trial, shortest: float = STANDS) -> list[tuple[int, i
     Args:
       shortest: such stretch, s. A run of which no channel tells its speed has none.
     """
-    return _longer(trial.time, _stretches(_slower(_speeds(trial))), shortest)
+    return _longer(trial.time, stretches(_slower(_speeds(trial))), shortest)
 
 
 def rests(trial: Trial) -> list[tuple[float, float]]:
@@ -47,8 +48,8 @@ def rests(trial: Trial) -> list[tuple[float, float]]:
     may push it to and fro until it rolls on.
     """
     time, speeds = trial.time, _speeds(trial)
-    slow, rocking = _slower(speeds), _stretches(_slower(speeds, ROCKING))
-    still = _stretches(slow)
+    slow, rocking = _slower(speeds), stretches(_slower(speeds, ROCKING))
+    still = stretches(slow)
     stands = _longer(time, still, STANDS)
     if still and still[-1][1] == time.size:
         stands += [s for s in _longer(time, still[-1:], STANDS_AT_END) if s not in stands]
@@ -136,9 +137,3 @@ def _averaged(trial: Trial, channel: str) -> Array:
     """A channel averaged over SPAN around each sample, (n,)."""
     width = max(3, int(SPAN / max(float(np.median(np.diff(trial.time))), 1e-4)))
     return np.asarray(uniform_filter1d(_filled(trial, channel), width, mode="nearest"))
-
-
-def _stretches(held: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First sample, and the one after the last, of every stretch that is True."""
-    edges = np.flatnonzero(np.diff(np.r_[0, held.astype(int), 0]))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

@@ -202,7 +202,7 @@ def _coming_to_rest(runs: list[Run]) -> list[str]:
 
 def _checked(trial: Trial, axle: RearAxle, mass: float) -> tuple[Trial, list[str]]:
     """The trial as it is used, and what was noticed."""
-    trial_checks.check_length(trial)
+    trial_checks.check_length(trial)  # before what needs several samples; of what is left below
     trial, said = without_lost(trial, axle)
     stages = (
         trial_checks.measured_part,

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from mjchair.measurement.stretches import stretches
+
 Array = NDArray[np.float64]
 
 SHORTEST = 1.5  # s
@@ -37,8 +39,8 @@ def coasts(time: Array, speed: Array) -> list[tuple[float, float]]:
     gained = RADIUS * np.gradient(np.abs(smooth), even)
     free = (gained < GAINS) & (gained > -BRAKES) & (np.abs(smooth) > SLOWEST)
     found = []
-    for first, last in _runs(free):
-        found += _even_parts(even, gained, first, last)
+    for first, after in stretches(free):
+        found += _even_parts(even, gained, first, after - 1)
     return found
 
 
@@ -55,8 +57,8 @@ def pushes(time: Array, pull: Array) -> int:
     smooth = smooth - np.median(smooth)
     counts = []
     for way in (1.0, -1.0):
-        parts = _runs(way * smooth > PUSH)
-        counts.append(sum(bool(even[b] - even[a] >= PUSHED) for a, b in parts))
+        parts = stretches(way * smooth > PUSH)
+        counts.append(sum(bool(even[b - 1] - even[a] >= PUSHED) for a, b in parts))
     return max(counts)
 
 
@@ -67,11 +69,6 @@ def smoothed(even: Array, values: Array) -> Array:
     return np.asarray(sosfiltfilt(sos, values, padlen=min(100, even.size - 2)))
 
 
-def _runs(flag: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.r_[False, flag, False].astype(int)))
-    return list(zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True))
-
-
 def _even_parts(time: Array, gained: Array, first: int, last: int) -> list[tuple[float, float]]:
     """The longest part about whose middle the deceleration stays even, if that is long enough."""
     begin, end = time[first] + MARGIN, time[last] - MARGIN
@@ -79,5 +76,5 @@ def _even_parts(time: Array, gained: Array, first: int, last: int) -> list[tuple
     if end - begin < SHORTEST or not inside.any():
         return []
     off = np.abs(gained - np.median(gained[inside])) > EVEN
-    parts = [(a, b) for a, b in _runs(inside & ~off) if time[b] - time[a] >= SHORTEST]
-    return [(float(time[a]), float(time[b])) for a, b in parts]
+    parts = [(float(time[a]), float(time[b - 1])) for a, b in stretches(inside & ~off)]
+    return [(a, b) for a, b in parts if b - a >= SHORTEST]

@@ -29,6 +29,7 @@ from mjchair.measurement.gather.study_file import study_text
 from mjchair.measurement.gather.together import Agreed, label_of, started_together
 from mjchair.measurement.gather.without_torque import estimated
 from mjchair.measurement.sensors import rolls
+from mjchair.measurement.stretches import stretches
 from mjchair.simulation.inputs import HAND_FORCES
 
 Array = NDArray[np.float64]
@@ -338,10 +339,7 @@ def _rests(trial: GatheredTrial) -> list[tuple[float, float]]:
     for one in motions:
         assert one.speed is not None
         still &= np.abs(np.interp(trial.time, one.time - trial.begin, one.speed)) < RESTS
-    edges = np.flatnonzero(np.diff(np.r_[False, still, False].astype(int)))
-    spans = [
-        (trial.time[a], trial.time[b - 1]) for a, b in zip(edges[::2], edges[1::2], strict=True)
-    ]
+    spans = [(trial.time[a], trial.time[b - 1]) for a, b in stretches(still)]
     return [(float(a), float(b)) for a, b in spans if b - a >= QUIET]
 
 
