@@ -163,15 +163,15 @@ def _torque(trial: Trial, inputs: Inputs, axle: RearAxle, mass: float) -> list[s
         pulls.append((story, torque))
     if taken < WORK + max(lost, 0.0):
         return []
-    said = f"{trial.name}: its torques take {taken:.0f} J from the chair, which had {lost:.0f} J to"
+    change = f"had {lost:.0f} J to lose" if lost > 0.0 else f"gained {-lost:.0f} J"
+    said = f"{trial.name}: its torques take {taken:.0f} J from the chair, which {change}"
     if all(_brakes_as_it_gains(story, torque) for story, torque in pulls):
         raise MjchairError(
-            f"{said} lose, and it gains speed the more they brake: positive torque drives forward; "
+            f"{said}, and it gains speed the more they brake: positive torque drives forward; "
             "turn their signs"
         )
     return [
-        f"{said} lose: positive torque drives forward; turn their signs, unless the way goes "
-        "downhill"
+        f"{said}: positive torque drives forward; turn their signs, unless the way goes downhill"
     ]
 
 
