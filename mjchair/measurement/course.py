@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import cholesky_banded, solve_banded
 
 from mjchair.measurement.clocks import Alignment, Signal
@@ -97,7 +98,7 @@ def _blocks(reference: Signal, mine: Signal, offset: float) -> _Blocks:
     turned = np.interp(at, when, course)
     speed = np.interp(at, when, np.gradient(course, when))
     place = np.linspace(-1.0, 1.0, at.size)
-    changed = np.r_[0.0, np.cumsum(0.5 * (place[1:] + place[:-1]) * np.diff(turned))]
+    changed = cumulative_trapezoid(place, turned, initial=0.0)
     columns = np.column_stack([mine.values - turned, speed, turned - turned[0], changed, at])
     number = np.floor((at - at[0]) / BLOCK).astype(int)
     count = np.bincount(number)

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from mjchair.errors import MjchairError, nearest, note
 from mjchair.measurement.smartwheel import PushRim, hand_force
@@ -291,7 +292,7 @@ def of_trial(trial: Trial, wheel: str = "left_wheel") -> Rim:
     elif f"{wheel}_speed" in trial.channels:
         seen, speeds = trial.samples(f"{wheel}_speed")
         speed = np.interp(time, seen, speeds)
-        angle = np.r_[0.0, np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))]
+        angle = cumulative_trapezoid(speed, time, initial=0.0)
     else:
         raise MjchairError(f"{trial.name}: neither {wheel}_angle nor {wheel}_speed is there")
     return Rim(time, angle, np.where(_unseen(time, seen), np.nan, speed), moment, None, wheel)

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from mjchair.measurement.gather.instruments import Instrument
 from mjchair.measurement.gather.join import GatheredTrial
@@ -102,8 +103,7 @@ def _forward(axes: Axes, trial: GatheredTrial) -> None:
     if frame is None or motion is None or motion.speed is None:
         return
     pull = frame.channels["imu_accelerometer.x"]
-    steps = 0.5 * (pull[1:] + pull[:-1]) * np.diff(frame.time)
-    gained = np.r_[0.0, np.cumsum(steps)]
+    gained = cumulative_trapezoid(pull, frame.time, initial=0.0)
     wheel = np.interp(frame.time, motion.time, motion.speed)
     line = frame.time - frame.time.mean()
     terms = np.column_stack([gained, np.ones_like(line), line, line**2])

@@ -11,6 +11,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from mjchair.errors import MjchairError
 from mjchair.measurement import table_wheels
@@ -132,7 +133,7 @@ def averaged(time: Array, values: Array, span: float = SPAN) -> tuple[Array, Arr
       time, values: samples that are there, (n,).
     """
     grid = np.arange(time[0] + 0.5 * span, time[-1] - 0.5 * span, 0.2 * span)
-    total = np.r_[0.0, np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time))]
+    total = cumulative_trapezoid(values, time, initial=0.0)
     after, before = (np.interp(grid + s * span, time, total) for s in (0.5, -0.5))
     return grid, np.asarray((after - before) / span)
 

@@ -12,6 +12,7 @@ from itertools import combinations
 from typing import NamedTuple, NoReturn
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from mjchair.diagnosis.data.trial_checks import averaged
 from mjchair.errors import MjchairError
@@ -298,7 +299,7 @@ def _compare_with_acceleration(trial: Trial, axle: RearAxle) -> None:
     seen = _mean(trial, speeds[0], axle.radius(speeds[0].split("_")[0]))
     if pull.time.size < 8 or seen.time.size < 8:
         return
-    gained = np.r_[0.0, np.cumsum(0.5 * (pull.values[1:] + pull.values[:-1]) * np.diff(pull.time))]
+    gained = cumulative_trapezoid(pull.values, pull.time, initial=0.0)
     speed = at(seen, pull.time)
     ramp = np.column_stack([np.ones(pull.time.size), pull.time])  # a slope's part, and a bias'
     speed, gained = (v - ramp @ np.linalg.lstsq(ramp, v, rcond=None)[0] for v in (speed, gained))

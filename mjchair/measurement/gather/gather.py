@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from mjchair.errors import MjchairError, nearest, note
 from mjchair.measurement.gather.coasts import coasts, pushes
@@ -233,8 +234,7 @@ def _way(one: Instrument) -> float:
     assert one.ground is not None
     there = np.isfinite(one.ground)
     time, speed = one.time[there], one.ground[there]
-    gone = np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))
-    return float(np.ptp(np.r_[0.0, gone]))
+    return float(np.ptp(cumulative_trapezoid(speed, time, initial=0.0)))
 
 
 def _pushed_unseen(trial: GatheredTrial) -> str:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.signal import savgol_filter
 
 from mjchair.errors import MjchairError
@@ -194,8 +195,7 @@ def _turned(one: Instrument) -> Signal:
         there = np.isfinite(angle)
         return Signal(one.time[there], angle[there])
     time, speed = _course(one)
-    steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(time)
-    return Signal(time, np.r_[0.0, np.cumsum(steps)])
+    return Signal(time, cumulative_trapezoid(speed, time, initial=0.0))
 
 
 def _smoothed(course: Signal) -> Signal:
@@ -207,7 +207,7 @@ def _smoothed(course: Signal) -> Signal:
         return course
     even = np.interp(time, course.time, course.values)
     speed = savgol_filter(even, width, 2, deriv=1, delta=step)
-    return Signal(time, np.r_[0.0, np.cumsum(0.5 * (speed[1:] + speed[:-1]) * step)])
+    return Signal(time, cumulative_trapezoid(speed, dx=step, initial=0.0))
 
 
 def heading_at(instruments: Sequence[Instrument], begin: float) -> float | None:
