@@ -55,3 +55,11 @@ def test_a_course_passes_over_gaps_and_an_angle_without_samples_stays():
     predicted = np.array([-3.1, -3.0])
     np.testing.assert_allclose(beside(predicted, counted[2:4]), TURN + predicted)
     assert (beside(predicted, np.full(2, np.nan)) == predicted).all()
+
+
+def test_a_first_sample_beyond_the_wrap_does_not_count_as_a_turn():
+    """A chair that begins at 180 degrees: noise puts its first sample on the other side."""
+    seen = np.r_[3.1, np.full(40, -3.12)]
+    np.testing.assert_allclose(course(seen), np.r_[3.1 - TURN, np.full(40, -3.12)])
+    turns = np.linspace(0.5, 0.5 + 2.0 * TURN, 100)
+    np.testing.assert_allclose(course((turns + np.pi) % TURN - np.pi), turns)

@@ -5,6 +5,7 @@ In: sensor data at every step. Out: (rows, channels) at the times of the samples
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import mujoco
@@ -18,6 +19,7 @@ from mjchair.simulation.channels import channels
 
 Array = NDArray[np.float64]
 TURN = 2.0 * np.pi
+BEGINS = 0.1  # of the samples of a run: by which its first turn is told
 
 
 def places(model: mujoco.MjModel, wanted: Sequence[str]) -> list[int]:
@@ -51,9 +53,17 @@ def sampled(sensed: Array, step: float, time: Array, names: Sequence[str]) -> Ar
 
 
 def course(values: Array) -> Array:
-    """An angle that wraps, (n,) with NaN where it was not measured, counted on over whole turns."""
+    """An angle that wraps, (n,) with NaN where it was not measured, counted on over whole turns.
+
+    Most of the first samples stay as they are. Where a heading wraps as a run begins, noise may put
+    the very first one on the other side, and a gain would act on the heading of that side.
+    """
     out, known = np.full(values.size, np.nan), np.isfinite(values)
-    out[known] = np.unwrap(values[known])
+    if known.any():
+        shown = values[known]
+        counted = np.unwrap(shown)
+        begins = slice(max(1, math.ceil(BEGINS * shown.size)))
+        out[known] = counted + TURN * np.round(np.median((shown - counted)[begins]) / TURN)
     return out
 
 
