@@ -322,6 +322,13 @@ def test_an_unknown_force_is_looked_for_where_it_goes(tied, word):
     assert wording.searching([]) == wording.OTHERWISE
 
 
+def test_a_run_in_which_somebody_may_have_pushed_is_left_out_first():
+    drivers = [(Driver(Quantity.TIME, "coast"), 9.0), (Driver(Quantity.HEADING), 5.0)]
+    assert "without coast" in wording.searching(drivers, {"coast"})
+    assert "without coast" not in wording.searching(drivers, {"push"})
+    assert "without coast" not in wording.searching(drivers[1:], {"coast"})
+
+
 def test_what_was_moved_far_is_to_be_measured():
     """A scrub of 2 N m in one turn passes for a centre of mass 27 mm further forward."""
     known = {n.name: n for n in MECHANICAL}

@@ -258,7 +258,8 @@ def _following(
         lone = lone_run(base, choice.fitted if choice else base.plain)
         if lone is not None:
             return wording.letting_in(*lone)
-        return wording.searching([(force.goes_with, force.sigmas) for force in left])
+        drivers = [(force.goes_with, force.sigmas) for force in left]
+        return wording.searching(drivers, event.pushed(base.bench.simulator))
     if said == Verdict.NAMED:
         return ""
     answered = choice if said == Verdict.AMBIGUOUS else None
@@ -452,8 +453,8 @@ def _notes(
     most = max((t.statistic for t in gap.tests), default=0.0)
     if rules.happened_once(event=once.gain, gain=most):
         notes.append(
-            f"it may have happened once: a force in {once.trial} between {once.second} and "
-            f"{once.second + event.LASTS} s alone brings {min(once.gain / most, 1.0):.0%} of what "
+            f"it may have happened once: a force in {once.trial} between {once.begin} and "
+            f"{once.end} s alone brings {min(once.gain / most, 1.0):.0%} of what "
             "any test shows; if something touched the chair then, cut the trial there"
         )
     elif any(force.goes_with.quantity == Quantity.STROKE for force in left[:TOP]):

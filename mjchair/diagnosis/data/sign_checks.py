@@ -127,20 +127,34 @@ def _moment_shares(inputs: Inputs, story: Story) -> Array:
     return np.asarray(shares if told else np.zeros(2))
 
 
-def _undriven(trial: Trial, axle: RearAxle) -> list[str]:
-    """A note where a chair gains speed that nothing gives it."""
+def gained_undriven(trial: Trial, axle: RearAxle) -> tuple[str, float] | None:
+    """A channel that shows a chair gain speed, and how much (m/s), where no torque is given.
+
+    Something else drives it then: somebody who pushes it, a slope, or a wind.
+    """
+    if trial.inputs is not None:
+        return None
     for name, story in forward(trial, axle).items():
         if story.time.size < 8:
             continue
         gains = np.gradient(story.values, story.time) > PULLED
         gained = float(np.sum(np.diff(story.values)[gains[1:]]))
         if gained > PUSHED:
-            return [
-                f"{trial.name}: by {name} it gains {gained:.2g} m/s and no torque is given, so it "
-                "is taken to coast; give left_wheel and right_wheel, or only what follows the last "
-                "push"
-            ]
-    return []
+            return name, gained
+    return None
+
+
+def _undriven(trial: Trial, axle: RearAxle) -> list[str]:
+    """A note where a chair gains speed that nothing gives it."""
+    found = gained_undriven(trial, axle)
+    if found is None:
+        return []
+    name, gained = found
+    return [
+        f"{trial.name}: by {name} it gains {gained:.2g} m/s and no torque is given, so it "
+        "is taken to coast; give left_wheel and right_wheel, or only what follows the last "
+        "push"
+    ]
 
 
 def _torque(trial: Trial, inputs: Inputs, axle: RearAxle, mass: float) -> list[str]:

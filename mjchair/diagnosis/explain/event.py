@@ -1,44 +1,63 @@
 """The most that something that happened once explains: a push, a bump, a gust in one run.
 
 In: the screened columns, among them forces that act in one second of one run. Out: which brings
-most chi2. Where it is about what an effect brings, nothing tells the two apart: a place
-that is passed once looks like a moment.
+most chi2, in two seconds, or in all of a run in which somebody may have pushed. Where it is about
+what an effect brings, nothing tells the two apart: a place that is passed once looks like a moment.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from mjchair.diagnosis.data.sign_checks import gained_undriven
 from mjchair.diagnosis.explain.column_ids import ForceColumn, Quantity
 from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis.replay.simulator import WindowSimulator
+from mjchair.model.rolling import rear_axle
 
 LASTS = 2  # seconds that follow each other, which an event may lie across
 
 
 @dataclass(frozen=True)
 class Event:
-    """Chi2 that an event brings, the run's name, and the second of the run's clock it begins in."""
+    """Chi2 that an event brings, the run's name, and the seconds of the run's clock it lies in."""
 
     gain: float
     trial: str = ""
-    second: int = 0
+    begin: int = 0
+    end: int = 0
 
 
 def largest(base: Base) -> Event:
-    """The event of one run that brings most: force and yaw moment, free in each second."""
+    """The event of one run that brings most: force and yaw moment, free in each second.
+
+    It lasts for LASTS seconds; for the whole run where that gains speed and no torque is given,
+    since somebody may have pushed the chair.
+    """
+    gaining = pushed(base.bench.simulator)
     moments: dict[str, dict[int, list[ForceColumn]]] = {}
     for column in base.columns:
         if isinstance(column, ForceColumn) and column.group.driver.quantity == Quantity.TIME:
             run = moments.setdefault(column.group.driver.trial, {})
             run.setdefault(column.part, []).append(column)
-    events = (
-        Event(base.reduced.gain(base.reduced.index(_following(run, second))), trial, second)
-        for trial, run in moments.items()
-        for second in run
-    )
+    events = []
+    for trial, run in moments.items():
+        whole = trial in gaining
+        spans = [(min(run), max(run) + 1)] if whole else [(k, k + LASTS) for k in run]
+        events += [_event(base, trial, run, span) for span in spans]
     return max(events, key=lambda event: event.gain, default=Event(0.0))
 
 
-def _following(run: dict[int, list[ForceColumn]], second: int) -> list[ForceColumn]:
-    """The forces of the seconds from one on."""
-    return [c for k in range(LASTS) for c in run.get(second + k, ())]
+def pushed(simulator: WindowSimulator) -> set[str]:
+    """Names of the runs that gain speed though no torque is given."""
+    axle = rear_axle(simulator.base)
+    trials = [run.trial for run in simulator.study.runs]
+    return {trial.name for trial in trials if gained_undriven(trial, axle) is not None}
+
+
+def _event(
+    base: Base, trial: str, run: dict[int, list[ForceColumn]], span: tuple[int, int]
+) -> Event:
+    """What the forces of a run bring between two seconds of its clock."""
+    columns = [c for k in range(*span) for c in run.get(k, ())]
+    return Event(base.reduced.gain(base.reduced.index(columns)), trial, *span)

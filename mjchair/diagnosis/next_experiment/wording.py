@@ -6,7 +6,7 @@ In: a `Plan`, what a missing force goes with, or what the fit moved far. Out: se
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from mjchair.diagnosis.data.roughly_known import Nuisance
 from mjchair.diagnosis.explain.column_ids import Driver, Quantity
@@ -197,14 +197,22 @@ def letting_in(run: str, left: float, others: float) -> str:
     )
 
 
-def searching(drivers: Sequence[tuple[Driver, float]]) -> str:
+def searching(drivers: Sequence[tuple[Driver, float]], pushed: Collection[str] = ()) -> str:
     """What to do about a force that no effect explains.
 
     Args:
       drivers: what it goes with, and by how many sigmas, strongest first.
+      pushed: runs in which the chair gains speed though no torque is given.
     """
     if not drivers:
         return OTHERWISE
+    run = drivers[0][0].trial
+    if run in pushed:
+        return (
+            f"Diagnose again without {run}, or with only what follows its last push: no torque is "
+            "given there and the chair gains speed, so somebody may have pushed it, and the force "
+            "that is missing most acts at times of this run."
+        )
     # a force at a moment fits anything: what else goes with it nearly as well says more
     telling = [
         driver
