@@ -345,6 +345,15 @@ def test_a_number_is_believed_that_data_tell_better_than_its_bounds():
     assert not rules.believable(std=0.3, change=0.2, width=1.0)  # as wide as the bounds allow
 
 
+def test_a_fit_ends_elsewhere_where_it_misses_more_than_linear_algebra_may():
+    """Of a gain of 600, linear algebra may be wrong by a tenth; of a small one by 30."""
+    assert rules.ends_elsewhere(behind=734.0, promised=11.0, gain=590.0)
+    assert not rules.ends_elsewhere(behind=70.0, promised=11.0, gain=600.0)
+    assert not rules.ends_elsewhere(behind=734.0, promised=700.0, gain=590.0)
+    assert not rules.ends_elsewhere(behind=29.0, promised=0.0, gain=50.0)
+    assert rules.ends_elsewhere(behind=31.0, promised=0.0, gain=50.0)
+
+
 def test_two_starts_that_end_apart_are_told():
     assert not rules.starts_disagree(100.0, 100.0 + rules.WORTH)
     assert rules.starts_disagree(100.0, 101.0 + rules.WORTH)

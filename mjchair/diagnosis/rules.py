@@ -380,6 +380,16 @@ def worth_trying(*, score: float, best: float, gain: float) -> bool:
     return best - score < max(NEXT * gain, RIVAL_CHI2)
 
 
+def ends_elsewhere(*, behind: float, promised: float, gain: float) -> bool:
+    """Whether a fit is so much further behind another than linear algebra says, that it is stuck.
+
+    Args:
+      behind: chi2 by which it is worse. promised: by which linear algebra says that it is.
+      gain: chi2 that the other brings; of so large a share linear algebra may be wrong.
+    """
+    return behind - promised > max(FAR_BEHIND * not_ruled_out(gain=gain), LINEAR * gain)
+
+
 def starts_disagree(one: float, two: float) -> bool:
     """Whether two fits of one hypothesis, by their chi2, end at different places."""
     return abs(one - two) > WORTH

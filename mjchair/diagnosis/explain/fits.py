@@ -115,9 +115,15 @@ class Fits:
             near=self.near,
             part=self._part(hypothesis),
             best=None if best is None else best.fitted,
+            behind=0.0 if best is None else self._behind(hypothesis, best),
             note=self._note,
         )
         return starts.fit()
+
+    def _behind(self, hypothesis: Hypothesis, best: Tried) -> float:
+        """Chi2 by which linear algebra says that a hypothesis brings less than the best."""
+        here = best.hypothesis if self.near is None else self.weigh(best.hypothesis.starts)
+        return max(0.0, here.gain - hypothesis.gain)
 
     def _part(self, hypothesis: Hypothesis) -> Fitted | None:
         """The best fit of some effects of a hypothesis; None: none was made."""

@@ -39,6 +39,7 @@ class MultiStart:
       near: the linear algebra that tells where to begin; None: that of the base.
       part: the best fit of some of the effects; None: none was made.
       best: fit of another hypothesis; what cannot come near it is not started again. None: none.
+      behind: chi2 by which linear algebra says that the hypothesis is worse than that one.
       note: is called with a line for each start or end that is left out.
     """
 
@@ -47,11 +48,12 @@ class MultiStart:
     near: NearFit | None
     part: Fitted | None
     best: Fitted | None
+    behind: float
     note: Say
 
     def fit(self) -> Fitted | None:
         """The best fit; from a second start where the first misses what was promised."""
-        return self._or_beside_part(self._best_start())
+        return self._or_where_best_is(self._or_beside_part(self._best_start()))
 
     def _best_start(self) -> Fitted | None:
         """The better of two starts; of one, where it gets to what was promised.
@@ -106,6 +108,27 @@ class MultiStart:
         more = [_smaller(t) for t in self._terms() if t.effect.key not in taken]
         start = replace(part.variant, terms=(*part.variant.terms, *more))
         fits = [f for f in (fitted, made_anew(self.base.bench, start, part.track)) if f is not None]
+        return min(fits, key=attrgetter("total"), default=None)
+
+    def _or_where_best_is(self, fitted: Fitted | None) -> Fitted | None:
+        """The fit, or a better one that begins where the best ended, with its own effects there.
+
+        A window's state may have more than one valley, as where a caster turns over or not. Of two
+        effects that linear algebra hardly tells apart, only one may have come to the deeper one.
+        """
+        best = self.best
+        if best is None or not rules.ends_elsewhere(
+            behind=np.inf if fitted is None else fitted.total - best.total,
+            promised=self.behind,
+            gain=gain(self.base, best),
+        ):
+            return fitted
+        known = {term.effect.key: term for term in best.variant.terms}
+        start = replace(
+            best.variant, terms=tuple(known.get(t.effect.key, t) for t in self._terms())
+        )
+        there = made_anew(self.base.bench, start, best.track)
+        fits = [f for f in (fitted, there) if f is not None]
         return min(fits, key=attrgetter("total"), default=None)
 
     def _best_share(self) -> float | None:
