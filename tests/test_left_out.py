@@ -111,6 +111,17 @@ def test_what_is_foretold_otherwise_counts_by_its_square(base):
     assert told_otherwise(base, 2.0 * wave) == pytest.approx(4.0 * once, rel=1e-9)
 
 
+def test_what_is_only_roughly_known_changes_no_more_than_the_fit_leaves_open(base):
+    """Five runs held out see a rolling radius that is one deviation off; one was fitted to."""
+    plain, held = base.plain, np.repeat(left_out.held_windows(base), 5)
+    name = RoughlyKnown("rolling_radius")
+    moved = [p + c for p, c in zip(plain.track.predicted, plain.columns[name], strict=True)]
+    fitted = replace(plain, track=SimpleNamespace(predicted=moved))
+    at = plain.system.places[name]
+    known = np.linalg.inv(bounded.covariance(plain.system, base.bench.windows))
+    assert left_out._changed(base, fitted, held) <= known[at, at] * (1.0 + 1e-6)
+
+
 def foretold(rng, sizes, missing=0.0):
     """Chi2 over its dof of two held-out runs, foretold by two that were fitted to, and as they are.
 

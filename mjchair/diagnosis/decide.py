@@ -23,6 +23,7 @@ from mjchair.diagnosis.explain.choice import Choice, closure
 from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.explain.gap import Gap, forces_left
 from mjchair.diagnosis.explain.left_out import (
+    gap_foretold,
     held_out,
     held_out_gain,
     held_windows,
@@ -78,11 +79,10 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     said = rules.verdict(gap.exists, stands)
     forces = missing_forces(base)
     size = material(base, gap, choice)
-    before = over_noise(*slow_part(base.plain.system, _shown_windows(base)))
     if not rules.matters(
         force=size.value,
         limit=size.limit,
-        gap=before,
+        gap=gap_foretold(base),
         excess=gap.excess / gap.excess_std,
         told=base.bench.simulator.study.material is not None,
         said=said,

@@ -286,9 +286,10 @@ def matters(
 
     Args:
       force: the largest missing force, N. limit: below which none matters, N.
-      gap: rms of the residual over the noise. excess: of the whole slow residual above what noise
-        gives, in its standard deviations; what makes none and is explained by nothing, or by what
-        is rather not there, does not matter, however large the force of a test that stands out.
+      gap: rms of the residual over the noise, on held-out trials as far as the others tell what is
+        only roughly known. excess: of the whole slow residual above what noise gives, in its
+        standard deviations; what makes none and is explained by nothing, or by what is rather not
+        there, does not matter, however large the force of a test that stands out.
       told: whether the person who asks gave the limit.
       probability: that an effect of the answer is there.
       nothing: whether that nothing is missing is more probable than any one explanation; then the

@@ -139,6 +139,18 @@ def lone_run(base: Base, fitted: Fitted) -> Lone | None:
     return Lone(name, most, others) if rules.shows_alone(held=most, others=others) else None
 
 
+def gap_foretold(base: Base) -> float:
+    """Rms over the noise of the slow residual that the chair without effects leaves.
+
+    Of the held-out trials, as far as the others tell what is only roughly known; of all trials
+    where none is held out.
+    """
+    held = held_windows(base)
+    if held.size:
+        return over_noise(*_foretold(base, base.plain, held))
+    return over_noise(*slow_part(base.plain.system, base.bench.windows))
+
+
 def _foretold(base: Base, fitted: Fitted, windows: NDArray[np.int64]) -> tuple[float, float]:
     """Chi2 of the slow residual of windows by what others foretell of them, and its dof.
 
@@ -155,15 +167,25 @@ def _foretold(base: Base, fitted: Fitted, windows: NDArray[np.int64]) -> tuple[f
 
 
 def _changed(base: Base, fitted: Fitted, windows: NDArray[np.int64]) -> float:
-    """Chi2 by which a fit foretells windows otherwise than the chair without effects."""
-    bench, before = base.bench, base.plain.track
-    simulator, out = bench.simulator, 0.0
+    """Chi2 by which a fit foretells windows otherwise than the chair without effects.
+
+    As far as the windows that were fitted to tell what is only roughly known: what a fit moved of
+    it without a reason is no change by its effects.
+    """
+    plain, bench = base.plain, base.bench
+    simulator, count = bench.simulator, base.plain.system.nuisance
+    columns = [plain.columns[c] for c in plain.system.columns[:count]]
+    chi2, shown, told = 0.0, np.zeros(count), np.zeros((count, count))
     for i in (int(w) for w in windows):
-        by = residual(fitted.track.predicted[i], before.predicted[i], simulator.channels)
+        by = residual(fitted.track.predicted[i], plain.track.predicted[i], simulator.channels)
         by[np.isnan(simulator.measured(simulator.windows[i]))] = np.nan
-        none = np.zeros((*by.shape, 0))
-        out += eliminate_window(simulator, before, bench.whitener, i, by, none, bench.process).chi2
-    return out
+        stacked = np.stack([column[i] for column in columns], axis=2)
+        left = eliminate_window(
+            simulator, plain.track, bench.whitener, i, by, stacked, bench.process
+        )
+        chi2, shown, told = chi2 + left.chi2, shown + left.b, told + left.G
+    spread = bounded.covariance(plain.system, bench.windows)[:count, :count]
+    return float(chi2 - shown @ np.linalg.solve(np.linalg.inv(spread) + told, shown))
 
 
 def slow_part(system: System, windows: NDArray[np.int64]) -> tuple[float, float]:
