@@ -118,6 +118,39 @@ def test_a_step_that_promised_much_and_failed_is_made_anew_with_small_changes(mo
     assert not window_states._goes_on(going[1], window_states.ROUNDS, kept=True, stands=False)
 
 
+@pytest.mark.parametrize(
+    ("size", "fresh", "anew"),
+    [
+        (2.0, True, False),  # it brought 7 of the 8 that it promised
+        (8.0, True, True),  # it brought 1
+        (9.5, False, True),  # it failed, and answers are of another place
+        (9.5, True, False),  # it failed by its length
+    ],
+)
+def test_answers_are_made_anew_where_a_step_brings_less_than_they_promise(
+    monkeypatch, size, fresh, anew
+):
+    asked = []
+
+    def answers(simulator, model, errors, states, share):
+        asked.extend(states)
+        return dict.fromkeys(states, "new")
+
+    shown = SimpleNamespace(predicted=None, trace={})
+    monkeypatch.setattr(window_states, "_traced", lambda *_: {0: shown})
+    monkeypatch.setattr(window_states, "_size", lambda *_: size)
+    monkeypatch.setattr(window_states, "_answers", answers)
+    monkeypatch.setattr(window_states, "_step", lambda *_: (np.ones(len(SLOW)), 5.0))
+    chair = SimpleNamespace(stands=lambda _: False, moved=lambda state, change: change)
+    simulator = SimpleNamespace(windows=[None], chair=chair, rolls=[True])
+    errors = SimpleNamespace(applied=lambda *_: None)
+    search = window_states.Search("tried", "best", 9.0, touchy=True, fresh=fresh, promise=8.0)
+    window_states._fit_round(
+        simulator, ("fine", "coarse"), errors, {0: search}, WHITE, ["old"], True
+    )
+    assert asked == ([0] if anew else [])
+
+
 @pytest.mark.parametrize("placed", [True, False])
 def test_what_a_window_cannot_tell_is_not_simulated(placed, monkeypatch):
     """The prior of a position that no channel sees holds it."""

@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 ROUNDS = 2  # Gauss-Newton rounds a window
 MORE = 4  # further ones, as where casters flip
 MUCH = 0.1  # of the misfit: a step that promised as much, and failed, came of wrong answers
+HELD = 0.5  # of what a step promised: where it brings more, the answers are not made anew
 FINER = 0.1  # of the steps of finite differences, where a step of the fit failed
 # of misfit, in variances of the sensors' noise, that the step of a round promises
 PROMISE = 4.0  # from which answers to the slow state are made anew where it led
@@ -209,6 +210,7 @@ class Search:
         the best. change: from the best to the one that was tried. promise: by how much that
         lessens the misfit, if linear. calm: whether no step from the best is worth it.
       touchy: whether a step failed, so that answers are made at the fine step, of small changes.
+      fresh: whether the answers were made at the best.
     """
 
     state: State
@@ -218,6 +220,7 @@ class Search:
     promise: float = np.inf
     calm: bool = False
     touchy: bool = False
+    fresh: bool = False
     predicted: Array = field(default_factory=lambda: np.empty(0))
     trace: dict[str, Array] = field(default_factory=dict)
 
@@ -276,12 +279,15 @@ def _fit_round(
     for i, outcome in _traced(simulator, fine, {i: s.state for i, s in search.items()}).items():
         s, w = search[i], simulator.windows[i]
         shown = errors.applied(simulator, w, outcome.predicted)
+        before, promised = s.size, s.promise
         if s.judge(_size(simulator, w, shown, white), shown, outcome.trace):
             good.append(i)
-            if s.touchy or not kept:
+            s.fresh = not kept or (s.touchy and not before - s.size > HELD * promised)
+            if s.fresh:
                 asked[i] = s.best
-        elif not s.touchy and _leads_astray(s, _stands(simulator, i, s.best)):
-            s.touchy, s.state, asked[i] = True, s.best, s.best
+        elif not (s.touchy and s.fresh) and _leads_astray(s, _stands(simulator, i, s.best)):
+            s.touchy = s.fresh = True
+            s.state, asked[i] = s.best, s.best
             good.append(i)
         else:
             s.change, s.promise = 0.3 * s.change, 0.3 * s.promise  # a step too far
