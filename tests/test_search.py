@@ -279,6 +279,38 @@ def test_a_gap_is_laid_to_a_further_effect_only_once_the_first_is_fitted_anew(fi
 
 
 @pytest.mark.parametrize(
+    ("sigmas", "from_there", "begins_again"),
+    [
+        (1.5, 1110.0, True),  # the chair without effects was stuck
+        (1.5, 1990.0, False),  # it is no better there
+        (30.0, 1110.0, False),  # the effect is surely there
+    ],
+)
+def test_a_chair_without_effects_is_fitted_from_where_effects_ended_that_are_hardly_there(
+    monkeypatch, sigmas, from_there, begins_again
+):
+    """A gain of 1.5 +- 1.0 % brought 1243, since it had come to another valley of states."""
+    gaps = []
+
+    def gap(base):
+        gaps.append(base.plain.total)
+        return SimpleNamespace(exists=base.plain.total > 1500.0)
+
+    helped = SimpleNamespace(fitted=fit(1100.0, "rolling"))
+    helped.fitted.sigmas, helped.fitted.columns = {"rolling": sigmas}, {}
+    monkeypatch.setattr(selection, "plain_gap", gap)
+    monkeypatch.setattr(selection, "choose", lambda _: helped)
+    monkeypatch.setattr(selection, "made_anew", lambda *_: fit(from_there))
+    monkeypatch.setattr(selection, "replace", put)
+    base, last, chosen = selection.explained(searching())
+    if begins_again:
+        assert gaps == [2000.0, from_there]
+        assert base.plain.total == from_there and chosen is None and not last.exists
+    else:
+        assert gaps == [2000.0] and chosen is helped
+
+
+@pytest.mark.parametrize(
     ("total", "promised", "far", "again"),
     [
         (1500.0, 1499.5, 0.0, False),

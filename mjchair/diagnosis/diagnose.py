@@ -17,9 +17,8 @@ from mjchair.diagnosis.data.study_file import read_study
 from mjchair.diagnosis.decide import conclude
 from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.further_effects import without_hidden
-from mjchair.diagnosis.explain.left_out import plain_gap
 from mjchair.diagnosis.explain.screening import Say, prepare, screen_columns, silent
-from mjchair.diagnosis.explain.selection import choose
+from mjchair.diagnosis.explain.selection import explained
 from mjchair.diagnosis.replay import strokes
 from mjchair.diagnosis.replay.cache import Store
 from mjchair.diagnosis.result import Diagnosis
@@ -81,12 +80,7 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"), without_engine_warnings():
         bench, first = prepare(known, say, store, threads)
         base = screen_columns(bench, first, study_effects(known, effects), say)
-        fits = without_hidden(Fits(base, say))
-        base = fits.base
-        say("the gap")
-        gap = plain_gap(base)
-        say("effects, one and two at a time")
-        return conclude(base, gap, choose(fits) if gap.exists else None)
+        return conclude(*explained(without_hidden(Fits(base, say))))
 
 
 def corrected(study: Study, diagnosis: Diagnosis) -> mujoco.MjSpec:

@@ -1,7 +1,8 @@
 """The search for effects: from one to as many as the data need, compared with rivals.
 
-In: fits around the screened columns. Out: a `Choice`, or None where no effect brings anything. The
-rules that decide stand in rules.py; a hypothesis that this chair cannot have is dropped and noted.
+In: fits around the screened columns. Out: the gap, and a `Choice`, or None where there is no gap or
+no effect brings anything. The rules that decide stand in rules.py; a hypothesis that this chair
+cannot have is dropped and noted.
 """
 
 from __future__ import annotations
@@ -13,11 +14,49 @@ from mjchair.diagnosis.explain.backward_elimination import without_needless
 from mjchair.diagnosis.explain.choice import Choice, Tried
 from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.forward_selection import grown
+from mjchair.diagnosis.explain.gap import Gap
+from mjchair.diagnosis.explain.left_out import plain_gap
+from mjchair.diagnosis.explain.multistart import made_anew
 from mjchair.diagnosis.explain.null_ensemble import confirmed
 from mjchair.diagnosis.explain.probable import better_than
 from mjchair.diagnosis.explain.rivals import against_rivals, own_gains
+from mjchair.diagnosis.explain.screening import Base, nuisances_of
 from mjchair.diagnosis.explain.shortlist import freed
 from mjchair.diagnosis.fit.nonlinear import Fitted
+
+
+def explained(fits: Fits) -> tuple[Base, Gap, Choice | None]:
+    """The chair without effects, the gap that it leaves, and the choice of effects that close it.
+
+    Where none of these is surely there, they may only have helped the fit past a place where the
+    chair without effects was stuck. If that fits better from there, all begins again around it.
+
+    Args:
+      fits: around the screened columns.
+    """
+    fits.say("the gap")
+    gap = plain_gap(fits.base)
+    fits.say("effects, one and two at a time")
+    choice = choose(fits) if gap.exists else None
+    if choice is None or max(choice.fitted.sigmas.values()) > rules.SIGMAS:
+        return fits.base, gap, choice
+    plain = plain_from(fits.base, choice.fitted)
+    if plain is None:
+        return fits.base, gap, choice
+    return explained(Fits(replace(fits.base, plain=plain), fits.say))
+
+
+def plain_from(base: Base, fitted: Fitted) -> Fitted | None:
+    """The chair without effects from where they ended, if it fits better there; None: it does not.
+
+    Args:
+      fitted: with effects.
+    """
+    start = replace(fitted.variant, terms=())
+    plain = made_anew(base.bench, start, fitted.track, nuisances_of(base, fitted))
+    if plain is None or base.plain.total - plain.total <= rules.WORTH:
+        return None
+    return plain
 
 
 def choose(fits: Fits) -> Choice | None:
