@@ -34,6 +34,7 @@ from mjchair.diagnosis.explain.choice import Choice, Tried
 from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.effects import air_drag, wind
 from mjchair.errors import MjchairError
@@ -413,7 +414,13 @@ def test_both_sides_are_free_where_the_data_leave_open_which_it_is(total, both_s
     """Of two wheels that differ by 1 mm, a rival came in by the right one alone."""
     right = Tried(Hypothesis((MOTOR,), 500.0, 490.0), SimpleNamespace(total=1100.0))
     both = Hypothesis((SimpleNamespace(effect=MOTOR.effect, free=("left", "right")),), 500.0, 480.0)
-    looking = SimpleNamespace(fit=lambda h, best: Tried(h, SimpleNamespace(total=total)))
+    looking = SimpleNamespace(
+        fit=lambda h, best: Tried(h, SimpleNamespace(total=total)),
+        near_to=lambda _: nullcontext(),
+        weigh=lambda _: SimpleNamespace(gain=500.0),
+        base=SimpleNamespace(starts=()),
+    )
+    monkeypatch.setattr(selection, "_richest", lambda *_: both.starts[0])
     monkeypatch.setattr(selection, "freed", lambda _, hypothesis: both)
     assert (selection._with_both_sides(looking, right).hypothesis is both) == both_sides
     monkeypatch.setattr(selection, "freed", lambda _, hypothesis: hypothesis)
@@ -431,6 +438,50 @@ def chosen(hypothesis, tried, own_gains):
         own_gains=own_gains,
         tried=fits_made,
     )
+
+
+@pytest.mark.parametrize(
+    ("gained", "std", "total", "both_sides"),
+    [
+        (-1.5e6, 1.5, 1099.5, True),  # around the fit linear algebra says nothing
+        (-1.5e6, 0.03, 1099.5, False),  # it is the right one
+        (-1.5e6, 1.5, 1200.0, False),  # no chair is so
+        (510.0, 1.5, 1099.5, False),  # linear algebra has compared them
+    ],
+)
+def test_both_sides_are_freed_by_a_fit_where_linear_algebra_says_nothing(
+    gained, std, total, both_sides, monkeypatch
+):
+    """A left wheel 1.27 mm smaller was a right one 1.27 +- 0.03 mm larger, beside a patch."""
+    parameter = SimpleNamespace(neutral=0.0)
+    sides = SimpleNamespace(key="wheel", seeds=None, common=1.0, parameter=lambda _: parameter)
+    right, both = (
+        SimpleNamespace(effect=sides, group="wheel", free=free, columns=free)
+        for free in (("right",), ("left", "right"))
+    )
+    at = Term(sides, {"left": 0.0, "right": 1.27}, ("right",))
+    chosen = SimpleNamespace(total=1100.0, variant=Variant((), terms=(at,)), track="track")
+    best = Tried(Hypothesis((right,), 500.0, 490.0), chosen)
+    kept = []
+
+    def made(bench, start, before):
+        parameters = [ParameterId("wheel", side) for side in start.terms[0].free]
+        assert before == "track" and len(parameters) == 2
+        parameter.name = "right"
+        return SimpleNamespace(total=total, variant=start, std=dict.fromkeys(parameters, std))
+
+    monkeypatch.setattr(selection, "freed", lambda _, hypothesis: hypothesis)
+    monkeypatch.setattr(selection, "made_anew", made)
+    looking = SimpleNamespace(
+        near_to=lambda _: nullcontext(),
+        weigh=lambda starts: SimpleNamespace(gain=500.0 if starts == (right,) else gained),
+        base=SimpleNamespace(starts=(right, both), bench=None),
+        keep_better=kept.append,
+    )
+    found = selection._with_both_sides(looking, best)
+    assert (found is not best) == both_sides
+    assert found.hypothesis.starts == ((both,) if both_sides else (right,))
+    assert kept == ([found] if both_sides else [])
 
 
 def test_what_was_fitted_and_is_probable_stands_in_the_set():

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain.backward_elimination import without_needless
+from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Choice, Tried
 from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.forward_selection import grown
@@ -101,10 +102,61 @@ def _with_both_sides(fits: Fits, best: Tried) -> Tried:
     A rival may have come in by one side alone: of two wheels that differ by 1 mm nothing tells
     whether one is larger or the other smaller than was said.
     """
-    both = freed(fits, best.hypothesis)
-    if both.free == best.hypothesis.free:
+    richer = [(s, more) for s in best.hypothesis.starts if (more := _richest(fits, s)) is not None]
+    if not richer:
         return best
-    tried = fits.fit(both, best)
-    if tried is None or tried.fitted.total > best.fitted.total + rules.NOTHING:
-        return best
+    with fits.near_to(best):
+        both = freed(fits, best.hypothesis)
+        if both.free == best.hypothesis.free:
+            unclear = [(s, more) for s, more in richer if _is_unclear(fits, best, s, more)]
+        else:
+            tried = fits.fit(both, best)
+            worse = tried is None or tried.fitted.total > best.fitted.total + rules.NOTHING
+            return best if tried is None or worse else tried
+    for start, more in unclear:
+        best = _freed_in_place(fits, best, start, more) or best
+    return best
+
+
+def _richest(fits: Fits, start: Start) -> Start | None:
+    """The start of the same effect that frees most; None: this one does."""
+    same = [s for s in fits.base.starts if s.group == start.group and s.effect.seeds is None]
+    more = max(same, key=lambda s: len(s.columns), default=start)
+    return more if set(more.columns) > set(start.columns) else None
+
+
+def _is_unclear(fits: Fits, best: Tried, start: Start, more: Start) -> bool:
+    """Whether linear algebra around the choice does not tell what freeing more brings.
+
+    With more parameters free nothing fits worse, so where it says that something does, it tells
+    nothing.
+    """
+    starts = best.hypothesis.starts
+    others = tuple(s for s in starts if s is not start)
+    return fits.weigh((*others, more)).gain < fits.weigh(starts).gain - rules.NOTHING
+
+
+def _freed_in_place(fits: Fits, best: Tried, start: Start, more: Start) -> Tried | None:
+    """The choice with more of one effect free, from where it stands; None: it is no better known.
+
+    What was free before is then no longer surely away from neutral.
+
+    Args:
+      start: which of the chosen. more: with more parameters free.
+    """
+    key, chosen = start.effect.key, best.fitted
+    terms = tuple(
+        replace(t, free=more.free) if t.effect.key == key else t for t in chosen.variant.terms
+    )
+    made = made_anew(fits.base.bench, replace(chosen.variant, terms=terms), chosen.track)
+    if made is None or made.total > chosen.total + rules.NOTHING:
+        return None
+    (term,) = (t for t in made.variant.terms if t.effect.key == key)
+    away = {name: (term.values[name] - p.neutral) / made.std[i]
+            for i, p in term.parameters if (name := p.name) in start.free}  # fmt: skip
+    if max(map(abs, away.values())) > rules.SIGMAS:
+        return None
+    starts = tuple(more if s is start else s for s in best.hypothesis.starts)
+    tried = Tried(replace(best.hypothesis, starts=starts), made)
+    fits.keep_better(tried)
     return tried
