@@ -229,3 +229,11 @@ def test_a_light_wind_is_told_from_still_air_and_what_goes_with_it():
         values = seed.combine(np.r_[coefficients, 0.0])
         assert values["x"] == pytest.approx(truth, rel=0.35)  # where a fit begins
         assert values["drag_area"] == pytest.approx(0.9, rel=0.1)
+
+
+def test_of_two_torque_gains_the_difference_is_said():
+    """Beside a mass that is only roughly known, runs tell the difference better than the sides."""
+    said = find("torque_gain").remark
+    both = said({"left": 0.171, "right": 0.007}, {"left": 0.044, "right": 0.038})
+    assert both == "left +17.1 ± 4.4 %, right +0.7 ± 3.8 %, left less right +16.4 %"
+    assert said({"left": 0.163, "right": 0.0}, {"left": 0.004}) == "left +16.3 ± 0.4 %"
