@@ -213,6 +213,14 @@ def test_a_fit_that_went_astray_begins_once_more_near_no_effect():
     assert here.values == pytest.approx({"x": 0.4, "y": -0.2, "drag_area": 0.9})
 
 
+def test_where_the_best_ended_a_term_has_its_values_and_frees_what_is_asked():
+    ended = Term(wind.EFFECT, {"x": 4.0, "y": 0.0, "drag_area": 0.9}, ("x",))
+    asked = Term(wind.EFFECT, {"x": 1.0, "y": 1.0, "drag_area": 0.6}, ("x", "y"))
+    assert multistart._as_in(ended, asked) == replace(asked, values=ended.values)
+    assert multistart._as_in(Term(air_drag.EFFECT, {}, ()), asked) is asked
+    assert multistart._as_in(None, asked) is asked
+
+
 def test_what_others_were_weighed_beside_is_not_fitted_with_them_from_afar(monkeypatch):
     """The best is rolling and motor: with wind beside both, the algebra around it has decided."""
     asked = []

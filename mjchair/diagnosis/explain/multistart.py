@@ -124,10 +124,8 @@ class MultiStart:
         ):
             return fitted
         known = {term.effect.key: term for term in best.variant.terms}
-        start = replace(
-            best.variant, terms=tuple(known.get(t.effect.key, t) for t in self._terms())
-        )
-        there = made_anew(self.base.bench, start, best.track)
+        terms = tuple(_as_in(known.get(t.effect.key), t) for t in self._terms())
+        there = made_anew(self.base.bench, replace(best.variant, terms=terms), best.track)
         fits = [f for f in (fitted, there) if f is not None]
         return min(fits, key=attrgetter("total"), default=None)
 
@@ -235,6 +233,13 @@ def made_anew(
     except (MjchairError, np.linalg.LinAlgError) as error:
         note(str(error))
         return None
+
+
+def _as_in(other: Term | None, term: Term) -> Term:
+    """A term with the values that it has in another fit, if it is in it in the same form."""
+    if other is None or other.effect is not term.effect:
+        return term
+    return replace(term, values=other.values)
 
 
 def _smaller(term: Term) -> Term:
