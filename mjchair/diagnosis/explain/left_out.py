@@ -160,10 +160,8 @@ def _foretold(base: Base, fitted: Fitted, windows: NDArray[np.int64]) -> tuple[f
     count = fitted.system.nuisance
     slow = np.concatenate([fitted.system.slow[int(i)][-1] for i in windows])
     left, columns = slow[:, 0] - slow[:, 1:] @ fitted.step[:count], slow[:, 1:]
-    spread = bounded.covariance(fitted.system, base.bench.windows)[:count, :count]
-    shown = columns.T @ left
-    known = np.linalg.inv(spread) + columns.T @ columns
-    return float(left @ left - shown @ np.linalg.solve(known, shown)), float(left.size)
+    told, shown = columns.T @ columns, columns.T @ left
+    return _beside_known(base, fitted, float(left @ left), shown, told), float(left.size)
 
 
 def _changed(base: Base, fitted: Fitted, windows: NDArray[np.int64]) -> float:
@@ -184,7 +182,17 @@ def _changed(base: Base, fitted: Fitted, windows: NDArray[np.int64]) -> float:
             simulator, plain.track, bench.whitener, i, by, stacked, bench.process
         )
         chi2, shown, told = chi2 + left.chi2, shown + left.b, told + left.G
-    spread = bounded.covariance(plain.system, bench.windows)[:count, :count]
+    return _beside_known(base, plain, chi2, shown, told)
+
+
+def _beside_known(base: Base, fitted: Fitted, chi2: float, shown: Array, told: Array) -> float:
+    """What is left of chi2 once roughly known numbers did their best, as far as a fit leaves open.
+
+    Args:
+      chi2: of some data. shown: (n,) products of the n roughly known numbers' columns with these
+        data. told: (n, n) of the columns with one another.
+    """
+    spread = bounded.covariance(fitted.system, base.bench.windows)[: shown.size, : shown.size]
     return float(chi2 - shown @ np.linalg.solve(np.linalg.inv(spread) + told, shown))
 
 

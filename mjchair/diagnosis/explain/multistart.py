@@ -92,8 +92,7 @@ class MultiStart:
             if better or not rules.is_stuck(total=near.total, promised=near.promised):
                 return near
         afar = replace(self, near=None)._from(1.0)
-        fits = [f for f in (near, afar) if f is not None]
-        return min(fits, key=attrgetter("total"), default=None)
+        return _better(near, afar)
 
     def _or_beside_part(self, fitted: Fitted | None) -> Fitted | None:
         """The fit, or a better one that begins where a part of the hypothesis was fitted.
@@ -107,8 +106,7 @@ class MultiStart:
         taken = {term.effect.key for term in part.variant.terms}
         more = [_smaller(t) for t in self._terms() if t.effect.key not in taken]
         start = replace(part.variant, terms=(*part.variant.terms, *more))
-        fits = [f for f in (fitted, made_anew(self.base.bench, start, part.track)) if f is not None]
-        return min(fits, key=attrgetter("total"), default=None)
+        return _better(fitted, made_anew(self.base.bench, start, part.track))
 
     def _or_where_best_is(self, fitted: Fitted | None) -> Fitted | None:
         """The fit, or a better one that begins where the best ended, with its own effects there.
@@ -125,9 +123,8 @@ class MultiStart:
             return fitted
         known = {term.effect.key: term for term in best.variant.terms}
         terms = tuple(_as_in(known.get(t.effect.key), t) for t in self._terms())
-        there = made_anew(self.base.bench, replace(best.variant, terms=terms), best.track)
-        fits = [f for f in (fitted, there) if f is not None]
-        return min(fits, key=attrgetter("total"), default=None)
+        start = replace(best.variant, terms=terms)
+        return _better(fitted, made_anew(self.base.bench, start, best.track))
 
     def _best_share(self) -> float | None:
         """The share of the linear coefficients that fits best as it stands; None: none can be.
@@ -212,7 +209,7 @@ class MultiStart:
         that were made without it then push these numbers to the ends of what they may be.
         """
         again = made_anew(self.base.bench, replace(fitted.variant, offsets={}), fitted.track)
-        return fitted if again is None else min(fitted, again, key=attrgetter("total"))
+        return _better(fitted, again) or fitted
 
 
 def made_anew(
@@ -233,6 +230,11 @@ def made_anew(
     except (MjchairError, np.linalg.LinAlgError) as error:
         note(str(error))
         return None
+
+
+def _better(*fits: Fitted | None) -> Fitted | None:
+    """The best of the fits that could be made; None: none could."""
+    return min((f for f in fits if f is not None), key=attrgetter("total"), default=None)
 
 
 def _as_in(other: Term | None, term: Term) -> Term:

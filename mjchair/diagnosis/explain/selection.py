@@ -107,12 +107,12 @@ def _with_both_sides(fits: Fits, best: Tried) -> Tried:
         return best
     with fits.near_to(best):
         both = freed(fits, best.hypothesis)
-        if both.free == best.hypothesis.free:
-            unclear = [(s, more) for s, more in richer if _is_unclear(fits, best, s, more)]
-        else:
+        if both.free != best.hypothesis.free:
             tried = fits.fit(both, best)
-            worse = tried is None or tried.fitted.total > best.fitted.total + rules.NOTHING
-            return best if tried is None or worse else tried
+            if tried is None or tried.fitted.total > best.fitted.total + rules.NOTHING:
+                return best
+            return tried
+        unclear = [(s, more) for s, more in richer if _is_unclear(fits, best, s, more)]
     for start, more in unclear:
         best = _freed_in_place(fits, best, start, more) or best
     return best
@@ -137,9 +137,10 @@ def _is_unclear(fits: Fits, best: Tried, start: Start, more: Start) -> bool:
 
 
 def _freed_in_place(fits: Fits, best: Tried, start: Start, more: Start) -> Tried | None:
-    """The choice with more of one effect free, from where it stands; None: it is no better known.
+    """The choice with more of one effect free, from where it stands; None: it stays as it is.
 
-    What was free before is then no longer surely away from neutral.
+    It stays where what was free before is surely away from neutral beside the rest as well, and
+    where the fit is worse.
 
     Args:
       start: which of the chosen. more: with more parameters free.
@@ -152,9 +153,11 @@ def _freed_in_place(fits: Fits, best: Tried, start: Start, more: Start) -> Tried
     if made is None or made.total > chosen.total + rules.NOTHING:
         return None
     (term,) = (t for t in made.variant.terms if t.effect.key == key)
-    away = {name: (term.values[name] - p.neutral) / made.std[i]
-            for i, p in term.parameters if (name := p.name) in start.free}  # fmt: skip
-    if max(map(abs, away.values())) > rules.SIGMAS:
+    if any(
+        abs(term.values[p.name] - p.neutral) > rules.SIGMAS * made.std[i]
+        for i, p in term.parameters
+        if p.name in start.free
+    ):
         return None
     starts = tuple(more if s is start else s for s in best.hypothesis.starts)
     tried = Tried(replace(best.hypothesis, starts=starts), made)

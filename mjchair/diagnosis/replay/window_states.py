@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 ROUNDS = 2  # Gauss-Newton rounds a window
 MORE = 4  # further ones, as where casters flip
 MUCH = 0.1  # of the misfit: a step that promised as much, and failed, came of wrong answers
-HELD = 0.5  # of what a step promised: where it brings more, the answers are not made anew
+ENOUGH = 0.5  # of what a step promised: where it brings more, the answers are not made anew
 FINER = 0.1  # of the steps of finite differences, where a step of the fit failed
 # of misfit, in variances of the sensors' noise, that the step of a round promises
 PROMISE = 4.0  # from which answers to the slow state are made anew where it led
@@ -282,7 +282,7 @@ def _fit_round(
         before, promised = s.size, s.promise
         if s.judge(_size(simulator, w, shown, white), shown, outcome.trace):
             good.append(i)
-            s.fresh = not kept or (s.touchy and not before - s.size > HELD * promised)
+            s.fresh = not kept or (s.touchy and not before - s.size > ENOUGH * promised)
             if s.fresh:
                 asked[i] = s.best
         elif not (s.touchy and s.fresh) and _leads_astray(s, _stands(simulator, i, s.best)):
