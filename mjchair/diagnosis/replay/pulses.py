@@ -152,7 +152,7 @@ def _force(
 ) -> Array:
     """Generalized force (steps, nv) of a pulse on the grid of the model's steps."""
     w, step = simulator.windows[pulse.window], float(model.opt.timestep)
-    steps = int(np.ceil(simulator.steps * simulator.step / step)) + 1
+    steps = simulator.steps(model, w)
     every = max(1, round(step / simulator.step))
     time = w.start + step * np.arange(steps)
     shape = np.clip(1.0 - np.abs(time - pulse.time) / pulse.width, 0.0, None)

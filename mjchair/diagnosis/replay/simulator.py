@@ -113,8 +113,6 @@ class WindowSimulator:
         self.step = float(self.base.opt.timestep)
         self.windows = list(windows) if windows is not None else cut(study.runs, self.step)
         self.rolls = self._rolling()
-        longest = max(w.last - w.start for w in self.windows)
-        self.steps = int(np.ceil(longest / self.step)) + 3
         self.coarse = self._coarse_step()
         self._places: dict[int, list[int]] = {}
         self.motions = [motions(run) | strokes.courses(run) for run in study.runs]
@@ -255,12 +253,12 @@ class WindowSimulator:
 
     def _key(self, jobs: Sequence[Job], store: Store) -> str:
         """Digest of all that the jobs' predictions follow from."""
-        parts: list[Part] = [self.studied, self.steps, self.step, *self.channels]
+        parts: list[Part] = [self.studied, self.step, *self.channels]
         models = {id(job.model): job.model for job in jobs}
         places = {name: k for k, name in enumerate(models)}
         for job in jobs:
             w, state = job.window, job.state
-            parts += [places[id(job.model)], job.late, w.run, w.start, w.rows]
+            parts += [places[id(job.model)], job.late, w.run, w.start, w.last, w.rows]
             parts += [state.qpos, state.qvel, state.act]
             parts.append(job.force if job.force is not None else "free")
             if job.sofar is not None:
@@ -274,9 +272,13 @@ class WindowSimulator:
         jobs = self._as_in_their_runs(jobs)
         outcomes: list[Outcome | None] = [None] * len(jobs)
         models = [job.model for job in jobs]
-        apart = [(job.force is None, job.begin) for job in jobs]
+        apart = [(job.force is None, job.begin, self.steps(job.model, job.window)) for job in jobs]
         record = tuple(dict.fromkeys(("sensordata", *trace)))
-        for chunk in batch.groups(models, self._steps, record, apart):
+
+        def longest(model: mujoco.MjModel) -> int:
+            return max(self.steps(model, job.window) for job in jobs)
+
+        for chunk in batch.groups(models, longest, record, apart):
             with installed():
                 done = self._chunk([jobs[i] for i in chunk], record, trace)
             for i, outcome in zip(chunk, done, strict=True):
@@ -300,14 +302,16 @@ class WindowSimulator:
                 known[key] = self.in_run(job.model, job.window.run)
         return [replace(job, model=known[id(job.model), job.window.run]) for job in jobs]
 
-    def _steps(self, model: mujoco.MjModel) -> int:
-        return int(np.ceil(self.steps * self.step / model.opt.timestep)) + 1
+    def steps(self, model: mujoco.MjModel, window: Window) -> int:
+        """Steps of a model from a window's start to past its end."""
+        steps = int(np.ceil((window.last - window.start) / self.step)) + 3
+        return int(np.ceil(steps * self.step / model.opt.timestep)) + 1
 
     def _chunk(self, jobs: list[Job], record: Sequence[str], trace: Sequence[str]) -> list[Outcome]:
         """Jobs of one model size that begin at the same step."""
         models = [job.model for job in jobs]
         model, begin = models[0], jobs[0].begin
-        steps = self._steps(model)
+        steps = self.steps(model, jobs[0].window)
         kept: dict[tuple[int, int, float], Array] = {}
         rows = []
         for job, m in zip(jobs, models, strict=True):
