@@ -412,6 +412,17 @@ def _remark(fitted: Fitted, term: Term) -> str:
     return term.effect.remark(term.values, std)
 
 
+def _happened_once(once: event.Event, share: float) -> str:
+    """A note on an event that alone brings this share of what any test shows."""
+    of_all = f"{share:.0%} of what any test shows"
+    if once.whole:
+        return f"it may be pushes that nobody measured: forces in {once.trial} alone bring {of_all}"
+    return (
+        f"it may have happened once: a force in {once.trial} between {once.begin} and {once.end} s "
+        f"alone brings {of_all}; if something touched the chair then, cut the trial there"
+    )
+
+
 def _notes(
     base: Base,
     gap: Gap,
@@ -452,11 +463,7 @@ def _notes(
     once = event.largest(base)
     most = max((t.statistic for t in gap.tests), default=0.0)
     if rules.happened_once(event=once.gain, gain=most):
-        notes.append(
-            f"it may have happened once: a force in {once.trial} between {once.begin} and "
-            f"{once.end} s alone brings {min(once.gain / most, 1.0):.0%} of what "
-            "any test shows; if something touched the chair then, cut the trial there"
-        )
+        notes.append(_happened_once(once, min(once.gain / most, 1.0)))
     elif any(force.goes_with.quantity == Quantity.STROKE for force in left[:TOP]):
         notes.append(
             "the missing force comes back with every stroke: chair and rider are not one rigid "

@@ -20,12 +20,17 @@ LASTS = 2  # seconds that follow each other, which an event may lie across
 
 @dataclass(frozen=True)
 class Event:
-    """Chi2 that an event brings, the run's name, and the seconds of the run's clock it lies in."""
+    """Chi2 that an event brings, the run's name, and the seconds of the run's clock it lies in.
+
+    Attributes:
+      whole: whether it lasts for the whole run, in which somebody may have pushed.
+    """
 
     gain: float
     trial: str = ""
     begin: int = 0
     end: int = 0
+    whole: bool = False
 
 
 def largest(base: Base) -> Event:
@@ -44,7 +49,7 @@ def largest(base: Base) -> Event:
     for trial, run in moments.items():
         whole = trial in gaining
         spans = [(min(run), max(run) + 1)] if whole else [(k, k + LASTS) for k in run]
-        events += [_event(base, trial, run, span) for span in spans]
+        events += [Event(_gain(base, run, span), trial, *span, whole) for span in spans]
     return max(events, key=lambda event: event.gain, default=Event(0.0))
 
 
@@ -55,9 +60,7 @@ def pushed(simulator: WindowSimulator) -> set[str]:
     return {trial.name for trial in trials if gained_undriven(trial, axle) is not None}
 
 
-def _event(
-    base: Base, trial: str, run: dict[int, list[ForceColumn]], span: tuple[int, int]
-) -> Event:
+def _gain(base: Base, run: dict[int, list[ForceColumn]], span: tuple[int, int]) -> float:
     """What the forces of a run bring between two seconds of its clock."""
     columns = [c for k in range(*span) for c in run.get(k, ())]
-    return Event(base.reduced.gain(base.reduced.index(columns)), trial, *span)
+    return float(base.reduced.gain(base.reduced.index(columns)))
