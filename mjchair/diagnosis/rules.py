@@ -22,6 +22,7 @@ CLOSES = 0.8  # share of the excess that a named effect closes
 PARTLY = 0.5  # share that an effect closes which is part of an answer, with a remainder
 CARRIED = 0.5  # share of the excess on held-out trials that it closes there
 BROUGHT = 0.2  # and that any answer closes there whose effects change more than the excess
+BY_NOISE = 2.0  # standard deviations by which noise may hide that they bring it
 PROBABLE = 0.95  # probability of a named effect
 FAR = 2.5  # standard deviations: what is only roughly known and was moved as far is measured
 SHOWN = 0.1  # probability of what is shown as a rival whatever its chi2
@@ -210,12 +211,14 @@ def opens_a_gap(held: HeldOut) -> bool:
     """Whether the effects are no better than nothing on held-out trials.
 
     Where a gap shows that they change, they must bring something, and BROUGHT of it where they
-    change more than there is; where none does, none may open beyond the scatter of noise. What
-    brings less than `carries_over` asks is an answer beside which more is missing.
+    change more than there is, but for what noise may take from them; where none does, none may
+    open beyond the scatter of noise. What brings less than `carries_over` asks is an answer beside
+    which more is missing.
     """
     if not held.shown:
         return held.left >= held.gap + held.scatter
-    return held.left >= held.gap * (1.0 - BROUGHT if held.changed >= held.gap else 1.0)
+    least = held.gap * (1.0 - BROUGHT if held.changed >= held.gap else 1.0)
+    return held.left >= max(least + BY_NOISE * 2.0 * math.sqrt(held.changed), held.scatter)
 
 
 def shows_again(held: HeldOut) -> bool:
