@@ -260,6 +260,9 @@ def test_what_an_answer_leaves_is_said():
         # what nothing explains and does not make the residual larger than noise
         ({"force": 4.0, "excess": 1.9}, False),
         ({"force": 4.0, "excess": 1.9, "gap": rules.SMALL_GAP}, True),
+        # a wind of 3 m/s on another chair, with a probability of 0.22
+        ({"force": 6.8, "excess": 1.9, "p": 1.5e-15}, True),
+        ({"force": 0.4, "excess": 1.9, "p": 1.5e-15}, False),
         ({"force": 4.0, "excess": 1.9, "told": True}, True),
         ({"force": 4.0, "excess": 1.9, "said": Verdict.NAMED}, True),
         # an answer that is rather not there is none, unless something shows
@@ -289,6 +292,7 @@ def test_what_is_below_the_limit_does_not_matter(changes, matters):
         "limit": 1.2,
         "gap": 1.1,
         "excess": 9.0,
+        "p": 1e-8,
         "told": False,
         "said": Verdict.UNKNOWN,
         "sigmas": rules.CERTAIN,

@@ -84,6 +84,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         limit=size.limit,
         gap=gap_foretold(base),
         excess=gap.excess / gap.excess_std,
+        p=gap.p,
         told=base.bench.simulator.study.material is not None,
         said=said,
         sigmas=min(stands.sigmas, default=0.0) if stands else 0.0,
@@ -92,7 +93,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         freed=bool(choice and _walls(base.plain) and not _walls(choice.fitted)),
     ):
         said = Verdict.NONE
-    if said == Verdict.UNKNOWN and choice is None:
+    if (said == Verdict.UNKNOWN and choice is None) or rules.surely(gap.p):
         probability = with_gap(probability, gap.p)
     named = choice if said in (Verdict.NAMED, Verdict.AMBIGUOUS) else None
     left = missing(choice.after if choice else gap)

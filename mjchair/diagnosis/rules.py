@@ -62,6 +62,9 @@ ROUNDING = 2e-4
 NOTHING = 1.0  # chi2 that decides nothing
 SMALL_GAP = 2.0  # rms of the residual over the noise up to which a gap may be none that matters
 SHOWS = 2.0  # standard deviations of the whole residual: less is no more than noise
+# chance of noise below which a gap shows (assumption; of 49 studies of benchmarks/blind that hide
+# nothing, the least was 1e-7)
+SURELY = 1e-10
 CERTAIN = 10.0  # standard errors beyond which an effect is named whatever its size
 MATERIAL = 0.12  # of the chair's own rolling resistance: a force that matters (assumption)
 LONE = 3.0  # times what any run of the fit leaves: only a held-out run shows it (assumption)
@@ -155,6 +158,11 @@ def gap_exists(p: float, sigmas: float, gain: float = 0.0) -> bool:
         which are in already.
     """
     return p < LEVEL and sigmas > max(LEAST, math.sqrt(ROUNDING * max(gain, 0.0)))
+
+
+def surely(p: float) -> bool:
+    """Whether a gap of this chance by noise shows, whatever else is said of it."""
+    return p < SURELY
 
 
 def may_be_of_the_null(sigmas: float) -> bool:
@@ -282,7 +290,7 @@ def more_missing(choice: Standing) -> bool:
 
 
 def matters(
-    *, force: float, limit: float, gap: float, excess: float, told: bool, said: Verdict,
+    *, force: float, limit: float, gap: float, excess: float, p: float, told: bool, said: Verdict,
     sigmas: float, probability: float, nothing: bool = False, freed: bool = False,
 ) -> bool:  # fmt: skip
     """Whether a gap is one that matters.
@@ -293,6 +301,7 @@ def matters(
         only roughly known. excess: of the whole slow residual above what noise gives, in its
         standard deviations; what makes none and is explained by nothing, or by what is rather not
         there, does not matter, however large the force of a test that stands out.
+      p: of the gap, by chance; one of SURELY shows, whatever the whole residual does.
       told: whether the person who asks gave the limit.
       probability: that an effect of the answer is there.
       nothing: whether that nothing is missing is more probable than any one explanation; then the
@@ -304,7 +313,8 @@ def matters(
     """
     answered = said != Verdict.UNKNOWN and (probability >= LIKELY or freed)
     shows = LEAST if nothing else SHOWS
-    if not answered and not told and excess < shows and gap < SMALL_GAP:
+    unclear = excess < shows and gap < SMALL_GAP and not surely(p)
+    if not answered and not told and unclear:
         return False
     if force >= limit or said == Verdict.NONE:
         return True
