@@ -111,7 +111,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         where=_where(base),
         next_experiment=_following(base, choice, said, plan, left),
         notes=[
-            *_notes(base, gap, choice, closed, said, left),
+            *_notes(base, gap, choice, stands, said, left),
             *(_differs(d) for d in differing if named),
             *unplanned,
         ],
@@ -413,6 +413,23 @@ def _remark(fitted: Fitted, term: Term) -> str:
     return term.effect.remark(term.values, std)
 
 
+def _no_answer(choice: Choice, stands: rules.Standing) -> str:
+    """A note on the nearest effects, which are no answer."""
+    names = " and ".join(t.effect.key for t in choice.fitted.variant.terms)
+    nearest = (
+        f"nothing in the library explains the gap; the nearest, {names}, closes "
+        f"{stands.closure:.0%} of it on the runs that it was fitted to"
+    )
+    held = stands.held_out
+    if held is None or not rules.opens_a_gap(held):
+        return nearest
+    before, after = (math.sqrt(chi2 / held.dof) for chi2 in (held.before, held.after))
+    return (
+        f"{nearest}, but the held-out runs contradict it: their slow residual is {before:.2f} of "
+        f"the noise without it and {after:.2f} with it"
+    )
+
+
 def _happened_once(once: event.Event, share: float) -> str:
     """A note on an event that alone brings this share of what any test shows."""
     of_all = f"{share:.0%} of what any test shows"
@@ -428,7 +445,7 @@ def _notes(
     base: Base,
     gap: Gap,
     choice: Choice | None,
-    closed: float,
+    stands: rules.Standing | None,
     said: Verdict,
     left: list[MissingForce],
 ) -> list[str]:
@@ -455,12 +472,8 @@ def _notes(
         notes += [f"{name}: {line}" for name, line in said_of if line]
     if said != Verdict.UNKNOWN:
         return notes
-    if choice is not None:
-        names = " and ".join(t.effect.key for t in choice.fitted.variant.terms)
-        notes.append(
-            f"nothing in the library explains the gap; the nearest, {names}, closes {closed:.0%} "
-            "of it on the runs that it was fitted to"
-        )
+    if choice is not None and stands is not None:
+        notes.append(_no_answer(choice, stands))
     once = event.largest(base)
     most = max((t.statistic for t in gap.tests), default=0.0)
     if rules.happened_once(event=once.gain, gain=most):
