@@ -8,6 +8,7 @@ from noisy_run import NOISE, noisy_run
 
 import mjchair
 from mjchair.diagnosis.data.study import make_study
+from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.left_out import with_terms
 from mjchair.diagnosis.explain.screening import gap_after, prepare, screen_columns
 from mjchair.diagnosis.fit.nonlinear import refit
@@ -64,3 +65,10 @@ def test_a_variant_without_effects_has_none(fits):
     base, *_ = fits
     assert base.plain.variant.terms == Variant(()).terms
     assert with_terms(base, base.plain)[1] == []
+
+
+def test_a_study_whose_channels_have_no_slow_part_shows_no_excess():
+    """Marker positions with a gap of 6 s left two windows too short for any."""
+    nothing = Gap(tests=[], p=1.0, exists=False, excess=0.0, excess_std=0.0)
+    assert nothing.sigmas == 0.0
+    assert replace(nothing, excess=12.0, excess_std=4.0).sigmas == 3.0

@@ -405,6 +405,14 @@ def test_a_coast_is_a_coast_and_strokes_are_none(run):
     assert coasts(*_column(lab.motion(20.0, coast=0.2))) == []
 
 
+def test_where_markers_were_lost_nothing_rolls_freely(run):
+    """A straight line between the last sample and the next would be the evenest coast of all."""
+    time, wheels, _ = run
+    (only,) = coasts(time, wheels[:, 0])
+    seen = (time < only[0] + 0.2) | (time > only[1] - 0.2)
+    assert coasts(time[seen], wheels[seen, 0]) == []
+
+
 def test_pushes_are_counted_either_way_and_a_few_samples_hold_none(run):
     time, wheels, _ = run
     pull = np.gradient(wheels.mean(axis=1) * lab.RADIUS, time)[::10]

@@ -123,6 +123,19 @@ def test_a_wheel_whose_sensor_has_a_gain_has_its_sign(gain, bends, tmp_path):
     mjchair.read_study(write(tmp_path, columns))
 
 
+def test_alike_torques_do_not_spin_a_chair_on_the_spot(tmp_path):
+    """Without a gyroscope nothing else tells that one wheel counts down; a spin has its moment."""
+    for right, torque, wrong in ((-2.0, 3.0, True), (-2.0, -3.0, False), (2.0, 3.0, False)):
+        stroke = 1.0 + 0.5 * np.sin(TIME)
+        columns = {"left_wheel_speed": 2.0 * stroke, "right_wheel_speed": right * stroke}
+        columns |= {"left_wheel": 3.0 * stroke, "right_wheel": torque * stroke}
+        folder = write(tmp_path, columns)
+        if wrong:
+            fails(folder, "the wheels roll opposite ways, and their torques are alike")
+        else:
+            mjchair.read_study(folder)
+
+
 def test_torques_that_take_what_the_chair_never_had_are_noted(tmp_path):
     """Positive torque drives forward; brakes that slow the chair down are no such case."""
     for speed, torque, doubt in ((3.0, -6.0, True), (3.0, 6.0, False), (9.0, -6.0, False)):

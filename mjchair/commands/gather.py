@@ -54,7 +54,8 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
         metavar="FILE=SECONDS",
         action="append",
         default=[],
-        help="what is added to a file's clock, where it cannot be found out; may be given again",
+        help="s, added to a file's clock, where it cannot be found out; may be given again. The "
+        "clock of an IMU's file is 0 at its first sample, a table's is its own",
     )
     options.add_output(parser, "out/study")
     parser.set_defaults(run=run)

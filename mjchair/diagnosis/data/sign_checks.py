@@ -28,6 +28,7 @@ SWAPPED = 0.8  # cosine of a turning moment with what turns the chair, beyond wh
 PUSHED = 0.3  # m/s, that a chair gains at PULLED or more only if something drives it, or downhill
 PULLED = 0.3  # m/s^2, as a slope of 3 %
 TOLD = 0.3  # of a torque, in rms, that must go with speed and its gain (0.34 of one in strokes)
+ALIKE = 0.5  # of their sum: torques whose difference is less are alike (rms)
 WORK = 40.0  # J that torques take from a chair, more than it lost: a sign may be wrong (assumption)
 SIDES = ("left", "right")
 
@@ -49,6 +50,7 @@ def check(trial: Trial, axle: RearAxle, mass: float) -> list[str]:
             _check_spin(trial, axle, (name, story), stories["wheels"])
     if trial.inputs is None:
         return _undriven(trial, axle)
+    _check_equal(trial, trial.inputs, axle, stories)
     _check_moment(trial, trial.inputs, stories)
     return _torque(trial, trial.inputs, axle, mass)
 
@@ -92,6 +94,23 @@ def _check_spin(trial: Trial, axle: RearAxle, seen: tuple[str, Story], wheels: S
         raise MjchairError(
             f"{trial.name}: the wheels tell a turn of {told:.2g} rad/s, and {name} sees "
             f"{other:.2g}: does one of them count down as it rolls forward? Turn its sign"
+        )
+
+
+def _check_equal(trial: Trial, inputs: Inputs, axle: RearAxle, stories: dict[str, Story]) -> None:
+    """Torques that are alike on both sides do not spin a chair on the spot."""
+    sides = [f"{side}_wheel" for side in SIDES]
+    wheels = stories.get("wheels")
+    if wheels is None or not set(sides) <= set(inputs.controls):
+        return
+    if np.sqrt(np.mean(wheels.values**2)) < SPUN:
+        return
+    left, right = (_torque_at(inputs, side, wheels.time) for side in SIDES)
+    alike = np.linalg.norm(left - right) < ALIKE * np.linalg.norm(left + right)
+    if alike and any(_are_opposite(pair, 0.0) for pair in wheel_pairs(forward(trial, axle))):
+        raise MjchairError(
+            f"{trial.name}: the wheels roll opposite ways, and their torques are alike: does one "
+            "wheel count down as it rolls forward? Turn its sign"
         )
 
 

@@ -81,6 +81,11 @@ class Gap:
     excess_std: float
     drawn: Array = field(default_factory=lambda: np.ones(DRAWS))
 
+    @property
+    def sigmas(self) -> float:
+        """The excess in its standard deviations; 0 where no channel has a slow part."""
+        return self.excess / self.excess_std if self.excess_std > 0.0 else 0.0
+
 
 def groups(columns: Sequence[ColumnId]) -> dict[Group, list[int]]:
     """Columns that are tested together: an effect's start, or a force with its driver."""

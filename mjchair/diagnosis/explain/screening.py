@@ -108,7 +108,11 @@ def prepare(
 def screen_columns(
     bench: Bench, first: Track, effects: Sequence[Effect], say: Say = silent
 ) -> Base:
-    """Every column around a chair without effects, and the linear algebra of them all."""
+    """Every column around a chair without effects, and the linear algebra of them all.
+
+    Raises:
+      MjchairError: the runs have too few samples to tell anything.
+    """
     simulator, variant, here = bench.simulator, Variant(bench.nuisances), first
     say("what is only roughly known")
     nuisances = nuisance_columns(bench, first, variant)
@@ -120,6 +124,7 @@ def screen_columns(
     plain = refit(bench, variant, first, nuisances)
     if _farthest(plain) > NEAR:
         plain = refit(bench, plain.variant, plain.track)
+    _check_told(plain)
     # a nuisance far from its prior stands in for something else: then the chair as given is nearer
     if not rules.is_far(_farthest(plain)):
         variant, here, nuisances = plain.variant, plain.track, plain.columns
@@ -299,6 +304,15 @@ def _best_of_sizes(reduced: Reduced, starts: Sequence[Start]) -> list[Hypothesis
     """The best hypotheses of each size that bring anything, by linear algebra, best first."""
     firsts = (h for options in hypotheses.by_size(reduced, starts) for h in options[:OF_A_SIZE])
     return sorted((h for h in firsts if h.score > 0.0), key=lambda h: -h.score)
+
+
+def _check_told(plain: Fitted) -> None:
+    """Refuse runs whose samples tell no more than how each window begins."""
+    if sum(cells.total_dof for cells in plain.system.cells) <= 0.0:
+        raise MjchairError(
+            "the runs have too few samples to tell anything: every 2 s of a run frees where it is "
+            "and how fast it rolls; measure more often, or add channels"
+        )
 
 
 def _farthest(plain: Fitted) -> float:

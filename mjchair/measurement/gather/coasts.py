@@ -24,6 +24,7 @@ EVEN = 0.20  # m/s^2, within which a coast's deceleration stays about its middle
 CUTOFF = 2.0  # Hz, of the speed that is judged
 PUSH, PUSHED = 0.3, 0.1  # m/s^2 and s, which a push is at least; a coast's slowing is below it
 FEW = 10  # samples, of which none tells a push
+GAP = 0.25  # s between samples, in which a hand may have been on the rim
 MARGIN = 0.15  # s, left out at both ends
 
 
@@ -38,10 +39,18 @@ def coasts(time: Array, speed: Array) -> list[tuple[float, float]]:
     smooth = smoothed(even, np.interp(even, time, speed))
     gained = RADIUS * np.gradient(np.abs(smooth), even)
     free = (gained < GAINS) & (gained > -BRAKES) & (np.abs(smooth) > SLOWEST)
+    free &= _seen(time, even)
     found = []
     for first, after in stretches(free):
         found += _even_parts(even, gained, first, after - 1)
     return found
+
+
+def _seen(time: Array, even: Array) -> NDArray[np.bool_]:
+    """Whether times `even` (n,) lie between samples at `time` (m,) that are near each other."""
+    apart = np.diff(time)
+    after = np.clip(np.searchsorted(time, even, side="right"), 1, time.size - 1)
+    return np.asarray(apart[after - 1] <= max(GAP, 3.0 * float(np.median(apart))))
 
 
 def pushes(time: Array, pull: Array) -> int:

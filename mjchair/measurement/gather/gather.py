@@ -192,7 +192,9 @@ def _usable(trial: GatheredTrial, known: Known) -> list[GatheredTrial]:
     if motion is None or motion.speed is None:
         said = f"{trial.name}: no wheel's motion; it is taken as a coast throughout"
         return [replace(trial, notes=(*trial.notes, said))]
-    parts = coasts(motion.time, motion.speed)
+    # where no marker shows the chair, its speed is a line from the last that did to the next
+    seen = np.full(motion.time.size, True) if motion.ground is None else np.isfinite(motion.ground)
+    parts = coasts(motion.time[seen], motion.speed[seen])
     rolling = float(np.mean(np.abs(motion.speed) > 0.5)) * float(np.ptp(motion.time))
     total = sum(end - begin for begin, end in parts)
     if any(one.free is not None for one in trial.instruments) or total > 0.9 * rolling:

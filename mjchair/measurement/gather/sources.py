@@ -49,7 +49,8 @@ PLACES = {
 STILL = {"static", "calibration", "neutral", "statisch", "statique"}
 BASELINE = {"baseline", "unloaded", "nohand", "nohands", "untouched", "bare", "norider"}
 INSTRUMENTS = {
-    *("smartwheel", "sw", "wheel", "kinetics", "imu", "ngimu", "ximu", "ximu3", "xsens", "dot"),
+    *("smartwheel", "sw", "wheel", "wheels", "enc", "encoder", "encoders", "kinetics"),
+    *("imu", "ngimu", "ximu", "ximu3", "xsens", "dot"),
     *(
         "mocap",
         "markers",
