@@ -539,6 +539,21 @@ def test_a_file_with_one_row_is_named_and_the_others_are_gathered(tmp_path):
     assert gathered.unused[0] in gathered.files["gather.log"]
 
 
+def test_a_recording_that_is_not_read_is_listed_and_a_picture_is_not(tmp_path):
+    (tmp_path / "push1.csv").write_text(
+        "time,left_wheel_speed\n"
+        + "".join(f"{0.01 * k:.2f},{0.5 + 0.01 * k}\n" for k in range(200))
+    )
+    for name in ("kinetics.ktk.zip", "trial.mat", "photo.png"):
+        (tmp_path / name).write_bytes(b"0")
+    found = find_sources(tmp_path)
+    assert [line.partition(" is not used: export it")[0] for line in found.unused] == [
+        "kinetics.ktk.zip",
+        "trial.mat",
+    ]
+    assert len(found.sources) == 1
+
+
 def test_a_table_of_both_wheels_is_called_and_drawn_as_both(tmp_path):
     from mjchair.report.gathered import gathered_figure
 

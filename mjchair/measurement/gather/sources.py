@@ -35,6 +35,8 @@ PLAN = "gather.toml"
 LOG = "gather.log"  # stands in every study that was gathered
 DEEPEST = 4  # folders below the one that is given
 SUFFIXES = (".csv", ".txt", ".tsv", ".c3d", ".trc", ".parquet")
+# that hold recordings as well, and are not read
+EXPORTED = (".zip", ".mat", ".xlsx", ".xls", ".h5", ".hdf5", ".mvnx", ".mot", ".sto", ".bin")
 GENERIC = {"sensors", "inertial", "imu", "calinertialandmag", "data", "export", "stats"}
 SIDES = {
     **dict.fromkeys(("left", "l", "lhs", "swl", "lw", "leftwheel", "gauche", "links"), "left"),
@@ -124,6 +126,8 @@ def find_sources(folder: Path, mappings: Sequence[Path] = ()) -> Found:
         inside = path.relative_to(folder)
         if not path.is_file() or path.name == PLAN or len(inside.parts) > DEEPEST:
             continue
+        if path.suffix.lower() in EXPORTED and not path.name.startswith("."):
+            unused.append(f"{inside} is not used: export it as CSV, Parquet, C3D or TRC")
         if path.suffix.lower() not in SUFFIXES or path.name.startswith("."):
             continue
         if (path.parent / LOG).is_file():  # a study that was gathered before, no raw files
