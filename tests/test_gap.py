@@ -13,6 +13,7 @@ from mjchair.diagnosis.explain.left_out import with_terms
 from mjchair.diagnosis.explain.screening import gap_after, prepare, screen_columns
 from mjchair.diagnosis.fit.nonlinear import refit
 from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.diagnosis.material import largest
 from mjchair.effects.library import find
 from mjchair.simulation.initial import Initial
 
@@ -72,3 +73,14 @@ def test_a_study_whose_channels_have_no_slow_part_shows_no_excess():
     nothing = Gap(tests=[], p=1.0, exists=False, excess=0.0, excess_std=0.0)
     assert nothing.sigmas == 0.0
     assert replace(nothing, excess=12.0, excess_std=4.0).sigmas == 3.0
+
+
+def test_the_force_of_a_rolling_resistance_is_its_share_of_the_weight(fits):
+    """Half of it was laid to torques of the wheels that do the same, until these were left out."""
+    base = fits[0]
+    which = base.reduced.index(base.starts[0].columns)
+    (size,) = base.reduced.solve(which)
+    term = base.starts[0].term([size])
+    model = base.bench.simulator.base
+    weight = 9.81 * float(model.body_subtreemass[1])
+    assert largest(base, which) == pytest.approx(abs(term.values["coefficient"]) * weight, rel=0.1)

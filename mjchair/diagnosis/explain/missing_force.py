@@ -33,8 +33,6 @@ SPREAD = {  # standard deviation of the prior, N or N m
     Force.FORWARD: 10.0,
     Force.LEFTWARD: 10.0,
     Force.YAW: 3.0,
-    Force.LEFT_WHEEL: 2.0,
-    Force.RIGHT_WHEEL: 2.0,
 }
 SMOOTH = 0.35  # s, correlation time of the prior
 

@@ -28,14 +28,13 @@ class Force(StrEnum):
     """A generalized force on the chair.
 
     FORWARD and LEFTWARD act along the chair's axes at the ground below the axle, YAW about its
-    vertical, the wheels' torques about their axles.
+    vertical. Torques about the axles of the wheels do the same to a chair that rolls, so they would
+    only share its force.
     """
 
     FORWARD = "Fx"
     LEFTWARD = "Fy"
     YAW = "Mz"
-    LEFT_WHEEL = "left_wheel"
-    RIGHT_WHEEL = "right_wheel"
 
 
 @dataclass(frozen=True)
@@ -51,10 +50,7 @@ KINDS = {
     Force.FORWARD: Kind("N", 5.0, 0.2),
     Force.LEFTWARD: Kind("N", 5.0, 1.0),
     Force.YAW: Kind("N m", 2.0, 0.2),
-    Force.LEFT_WHEEL: Kind("N m", 1.0, 1.0),
-    Force.RIGHT_WHEEL: Kind("N m", 1.0, 1.0),
 }
-WHEELS = (Force.LEFT_WHEEL, Force.RIGHT_WHEEL)
 
 
 @dataclass(frozen=True)
@@ -160,9 +156,7 @@ def _force(
         shape[time < pulse.time] = 1.0
     force = np.zeros((steps, model.nv))
     size = KINDS[pulse.force].size * shape
-    if pulse.force in WHEELS:
-        force[:, chair.rear[WHEELS.index(pulse.force)].dof] = size
-    elif pulse.force == Force.YAW:
+    if pulse.force == Force.YAW:
         force[:, chair.dof + 5] = size
     else:
         x, y = headings(chair, track.trace[pulse.window]["qpos"])
