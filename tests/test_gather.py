@@ -411,6 +411,7 @@ def test_where_markers_were_lost_nothing_rolls_freely(run):
     (only,) = coasts(time, wheels[:, 0])
     seen = (time < only[0] + 0.2) | (time > only[1] - 0.2)
     assert coasts(time[seen], wheels[seen, 0]) == []
+    assert coasts(time[:1], wheels[:1, 0]) == []
 
 
 def test_pushes_are_counted_either_way_and_a_few_samples_hold_none(run):

@@ -23,7 +23,7 @@ BRAKES = 1.0  # m/s^2, beyond which something brakes
 EVEN = 0.20  # m/s^2, within which a coast's deceleration stays about its middle
 CUTOFF = 2.0  # Hz, of the speed that is judged
 PUSH, PUSHED = 0.3, 0.1  # m/s^2 and s, which a push is at least; a coast's slowing is below it
-FEW = 10  # samples, of which none tells a push
+FEW = 10  # samples, of which none tells a push or a coast
 GAP = 0.25  # s between samples, in which a hand may have been on the rim
 MARGIN = 0.15  # s, left out at both ends
 
@@ -34,6 +34,8 @@ def coasts(time: Array, speed: Array) -> list[tuple[float, float]]:
     Args:
       time: (n,), s. speed: (n,), rad/s, forward or backward.
     """
+    if time.size < FEW:
+        return []
     step = float(np.median(np.diff(time)))
     even = np.arange(time[0], time[-1], max(step, 0.005))
     smooth = smoothed(even, np.interp(even, time, speed))
