@@ -44,7 +44,7 @@ def test_groups_keep_sizes_steps_and_kinds_apart_and_fit_memory(manual, monkeypa
     models = [manual, power, manual, quick, manual]
 
     def found(apart=None):
-        return list(batch.groups(models, lambda model: 100, apart=apart))
+        return list(batch.groups(models, [100] * 5, apart=apart))
 
     assert found() == [[0, 2, 4], [1], [3]]
     assert found("aaaab") == [[0, 2], [1], [3], [4]]

@@ -71,8 +71,8 @@ def test_a_variant_without_effects_has_none(fits):
 def test_a_study_whose_channels_have_no_slow_part_shows_no_excess():
     """Marker positions with a gap of 6 s left two windows too short for any."""
     nothing = Gap(tests=[], p=1.0, exists=False, excess=0.0, excess_std=0.0)
-    assert nothing.sigmas == 0.0
-    assert replace(nothing, excess=12.0, excess_std=4.0).sigmas == 3.0
+    assert nothing.excess_sigmas == 0.0
+    assert replace(nothing, excess=12.0, excess_std=4.0).excess_sigmas == 3.0
 
 
 def test_the_force_of_a_rolling_resistance_is_its_share_of_the_weight(fits):

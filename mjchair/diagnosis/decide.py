@@ -83,7 +83,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         force=size.value,
         limit=size.limit,
         gap=gap_foretold(base),
-        excess=gap.sigmas,
+        excess=gap.excess_sigmas,
         p=gap.p,
         told=base.bench.simulator.study.material is not None,
         said=said,

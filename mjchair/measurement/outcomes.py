@@ -24,6 +24,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from mjchair.errors import MjchairError, nearest, note
 from mjchair.measurement.smartwheel import PushRim, hand_force
+from mjchair.measurement.stretches import in_a_gap
 from mjchair.measurement.torque import check_torques
 from mjchair.measurement.trial import Trial
 from mjchair.simulation.recording import Recording
@@ -300,12 +301,9 @@ def of_trial(trial: Trial, wheel: str = "left_wheel") -> Rim:
 
 def _unseen(time: Array, seen: Array) -> NDArray[np.bool_]:
     """Which times (n,), s, lie in a gap of the times at which a wheel is seen, (m,), s."""
-    steps = np.diff(seen)
-    if not steps.size:
+    if seen.size < 2:
         return np.ones(time.size, bool)
-    wide = np.flatnonzero(steps > max(SHORTEST, GAP * float(np.median(steps))))
-    at = np.searchsorted(seen, time, side="right") - 1
-    return np.isin(at, wide) & (time > seen[at])
+    return in_a_gap(time, seen, max(SHORTEST, GAP * float(np.median(np.diff(seen)))))
 
 
 def _speed(time: Array, angle: Array) -> Array:

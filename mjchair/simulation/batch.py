@@ -9,7 +9,7 @@ threads. The caller installs the callbacks.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -27,25 +27,25 @@ CONTROL = int(mujoco.mjtState.mjSTATE_CTRL)
 
 def groups(
     models: Sequence[mujoco.MjModel],
-    steps: Callable[[mujoco.MjModel], int],
+    steps: Sequence[int],
     record: Sequence[str] = ("sensordata",),
     apart: Sequence[Hashable] | None = None,
 ) -> Iterator[list[int]]:
     """Indices of models that can share a batch, in groups whose records are at most BYTES.
 
     Args:
-      models: one for each simulation. steps: number of time steps of a model. record: names of
+      models: one for each simulation. steps: number of time steps of each. record: names of
       WIDTHS. apart: a value for each simulation; simulations with different values are put into
-        different groups.
+        different groups, as are those of different steps.
     """
     alike: dict[Hashable, list[int]] = {}
     for i, model in enumerate(models):
-        sizes = (*(getattr(model, name) for name in SIZES), model.opt.timestep)
+        sizes = (*(getattr(model, name) for name in SIZES), model.opt.timestep, steps[i])
         alike.setdefault((sizes, apart[i] if apart else None), []).append(i)
     for members in alike.values():
         model = models[members[0]]
         width = sum(getattr(model, WIDTHS[name]) for name in record)
-        most = max(1, BYTES // (8 * steps(model) * max(width, 1)))
+        most = max(1, BYTES // (8 * steps[members[0]] * max(width, 1)))
         for at in range(0, len(members), most):
             yield members[at : at + most]
 

@@ -177,7 +177,8 @@ def run_chunk(
     install()
     keys = chair_keys(cases)
     models = [compiled_model(key) for key in keys]
-    for group in batch.groups(models, lambda model: _steps(study, model), ("sensordata", "qpos")):
+    steps = [_steps(study, model) for model in models]
+    for group in batch.groups(models, steps, ("sensordata", "qpos")):
         chosen = [cases[i] for i in group]
         starts = [start_state(keys[i], cases[i]) for i in group]
         results = _simulate(study, chosen, [models[i] for i in group], starts, threads)

@@ -50,8 +50,9 @@ def check(trial: Trial, axle: RearAxle, mass: float) -> list[str]:
             _check_spin(trial, axle, (name, story), stories["wheels"])
     if trial.inputs is None:
         return _undriven(trial, axle)
-    _check_equal(trial, trial.inputs, axle, stories)
-    _check_moment(trial, trial.inputs, stories)
+    if {f"{side}_wheel" for side in SIDES} <= set(trial.inputs.controls):
+        _check_equal(trial, trial.inputs, axle, stories.get("wheels"))
+        _check_moment(trial, trial.inputs, stories)
     return _torque(trial, trial.inputs, axle, mass)
 
 
@@ -90,24 +91,29 @@ def _check_spin(trial: Trial, axle: RearAxle, seen: tuple[str, Story], wheels: S
     told, other = (np.sqrt(np.mean(s**2)) for s in (wheels.values, at(story, wheels.time)))
     if told < SPUN or other > UNSEEN * told:
         return
-    if any(_are_opposite(pair, 0.0) for pair in wheel_pairs(forward(trial, axle))):
+    if _roll_opposite(trial, axle):
         raise MjchairError(
             f"{trial.name}: the wheels tell a turn of {told:.2g} rad/s, and {name} sees "
             f"{other:.2g}: does one of them count down as it rolls forward? Turn its sign"
         )
 
 
-def _check_equal(trial: Trial, inputs: Inputs, axle: RearAxle, stories: dict[str, Story]) -> None:
-    """Torques that are alike on both sides do not spin a chair on the spot."""
-    sides = [f"{side}_wheel" for side in SIDES]
-    wheels = stories.get("wheels")
-    if wheels is None or not set(sides) <= set(inputs.controls):
-        return
-    if np.sqrt(np.mean(wheels.values**2)) < SPUN:
+def _roll_opposite(trial: Trial, axle: RearAxle) -> bool:
+    """Whether one wheel rolls back as the other rolls forward, at the same speed."""
+    return any(_are_opposite(pair, 0.0) for pair in wheel_pairs(forward(trial, axle)))
+
+
+def _check_equal(trial: Trial, inputs: Inputs, axle: RearAxle, wheels: Story | None) -> None:
+    """Torques that are alike on both sides do not spin a chair on the spot.
+
+    Args:
+      wheels: how fast it turns by the difference of its wheels; None: not both were measured.
+    """
+    if wheels is None or np.sqrt(np.mean(wheels.values**2)) < SPUN:
         return
     left, right = (_torque_at(inputs, side, wheels.time) for side in SIDES)
     alike = np.linalg.norm(left - right) < ALIKE * np.linalg.norm(left + right)
-    if alike and any(_are_opposite(pair, 0.0) for pair in wheel_pairs(forward(trial, axle))):
+    if alike and _roll_opposite(trial, axle):
         raise MjchairError(
             f"{trial.name}: the wheels roll opposite ways, and their torques are alike: does one "
             "wheel count down as it rolls forward? Turn its sign"
@@ -119,8 +125,6 @@ def _check_moment(trial: Trial, inputs: Inputs, turns: dict[str, Story]) -> None
 
     What it does not spend on a faster turn, it spends on the turn itself.
     """
-    if not {f"{side}_wheel" for side in SIDES} <= set(inputs.controls):
-        return
     shares = {name: _moment_shares(inputs, story) for name, story in turns.items()}
     against = [name for name, share in shares.items() if (share < 0.0).all()]
     if against and not any((share > 0.0).any() for share in shares.values()):

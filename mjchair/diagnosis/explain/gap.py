@@ -82,7 +82,7 @@ class Gap:
     drawn: Array = field(default_factory=lambda: np.ones(DRAWS))
 
     @property
-    def sigmas(self) -> float:
+    def excess_sigmas(self) -> float:
         """The excess in its standard deviations; 0 where no channel has a slow part."""
         return self.excess / self.excess_std if self.excess_std > 0.0 else 0.0
 

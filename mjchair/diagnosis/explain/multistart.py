@@ -78,7 +78,7 @@ class MultiStart:
             ends = " and ".join(f"{f.total:.0f}" for f in fits)
             names = self.hypothesis.label
             self.note(f"fits of {names} from two starts end at chi2 of {ends}; the less is used")
-        return min(fits, key=attrgetter("total"), default=None)
+        return _better(first, second)
 
     def _or_from_afar(self, near: Fitted | None) -> Fitted | None:
         """The fit that began near another, or one from afar where that one is stuck.

@@ -59,7 +59,7 @@ def chosen(choice: Choice | None) -> Chosen | None:
 
 
 def with_gap(probability: Mapping[str, float], p: float) -> dict[str, float]:
-    """Probabilities where a gap stands that no effect explains: chance alone has no more than `p`.
+    """Probabilities where a gap surely shows, or none explains it: chance has no more than `p`.
 
     The rest of what nothing missing had goes to something outside the library.
 

@@ -272,13 +272,10 @@ class WindowSimulator:
         jobs = self._as_in_their_runs(jobs)
         outcomes: list[Outcome | None] = [None] * len(jobs)
         models = [job.model for job in jobs]
-        apart = [(job.force is None, job.begin, self.steps(job.model, job.window)) for job in jobs]
+        apart = [(job.force is None, job.begin) for job in jobs]
+        steps = [self.steps(job.model, job.window) for job in jobs]
         record = tuple(dict.fromkeys(("sensordata", *trace)))
-
-        def longest(model: mujoco.MjModel) -> int:
-            return max(self.steps(model, job.window) for job in jobs)
-
-        for chunk in batch.groups(models, longest, record, apart):
+        for chunk in batch.groups(models, steps, record, apart):
             with installed():
                 done = self._chunk([jobs[i] for i in chunk], record, trace)
             for i, outcome in zip(chunk, done, strict=True):
@@ -308,7 +305,7 @@ class WindowSimulator:
         return int(np.ceil(steps * self.step / model.opt.timestep)) + 1
 
     def _chunk(self, jobs: list[Job], record: Sequence[str], trace: Sequence[str]) -> list[Outcome]:
-        """Jobs of one model size that begin at the same step."""
+        """Jobs of one model size and as many steps, that begin at the same step."""
         models = [job.model for job in jobs]
         model, begin = models[0], jobs[0].begin
         steps = self.steps(model, jobs[0].window)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from mjchair.measurement.stretches import stretches
+from mjchair.measurement.stretches import in_a_gap, stretches
 
 Array = NDArray[np.float64]
 
@@ -41,18 +41,11 @@ def coasts(time: Array, speed: Array) -> list[tuple[float, float]]:
     smooth = smoothed(even, np.interp(even, time, speed))
     gained = RADIUS * np.gradient(np.abs(smooth), even)
     free = (gained < GAINS) & (gained > -BRAKES) & (np.abs(smooth) > SLOWEST)
-    free &= _seen(time, even)
+    free &= ~in_a_gap(even, time, max(GAP, 3.0 * step))
     found = []
     for first, after in stretches(free):
         found += _even_parts(even, gained, first, after - 1)
     return found
-
-
-def _seen(time: Array, even: Array) -> NDArray[np.bool_]:
-    """Whether times `even` (n,) lie between samples at `time` (m,) that are near each other."""
-    apart = np.diff(time)
-    after = np.clip(np.searchsorted(time, even, side="right"), 1, time.size - 1)
-    return np.asarray(apart[after - 1] <= max(GAP, 3.0 * float(np.median(apart))))
 
 
 def pushes(time: Array, pull: Array) -> int:

@@ -192,9 +192,7 @@ def _usable(trial: GatheredTrial, known: Known) -> list[GatheredTrial]:
     if motion is None or motion.speed is None:
         said = f"{trial.name}: no wheel's motion; it is taken as a coast throughout"
         return [replace(trial, notes=(*trial.notes, said))]
-    # where no marker shows the chair, its speed is a line from the last that did to the next
-    seen = np.full(motion.time.size, True) if motion.ground is None else np.isfinite(motion.ground)
-    parts = coasts(motion.time[seen], motion.speed[seen])
+    parts = coasts(motion.time[motion.seen], motion.speed[motion.seen])
     rolling = float(np.mean(np.abs(motion.speed) > 0.5)) * float(np.ptp(motion.time))
     total = sum(end - begin for begin, end in parts)
     if any(one.free is not None for one in trial.instruments) or total > 0.9 * rolling:
@@ -234,8 +232,7 @@ def _goes_nowhere(trial: GatheredTrial, known: Known) -> str:
 def _way(one: Instrument) -> float:
     """How far apart two places of a chair are along its way, by its markers, m."""
     assert one.ground is not None
-    there = np.isfinite(one.ground)
-    time, speed = one.time[there], one.ground[there]
+    time, speed = one.time[one.seen], one.ground[one.seen]
     return float(np.ptp(cumulative_trapezoid(speed, time, initial=0.0)))
 
 

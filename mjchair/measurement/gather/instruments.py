@@ -85,6 +85,13 @@ class Instrument:
         names = (*self.channels, *self.torque)
         return tuple(s for s in OTHER if any(name.startswith(f"{s}_wheel") for name in names))
 
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Where the motion is seen, (n,); between markers that were lost `speed` is a line."""
+        if self.ground is None:
+            return np.ones(self.time.size, bool)
+        return np.isfinite(self.ground)
+
     def courses(self) -> dict[str, Array]:
         """Side -> the speed (n,) rad/s of each wheel that shows the motion; "": of markers."""
         if self.speed is None:

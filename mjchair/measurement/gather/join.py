@@ -241,7 +241,7 @@ def _course(one: Instrument) -> Signal:
     assert one.speed is not None
     if one.ground is None:
         return Signal(one.time, one.speed)
-    seen = np.flatnonzero(np.isfinite(one.ground))
+    seen = np.flatnonzero(one.seen)
     parts = np.split(seen, np.flatnonzero(np.diff(one.time[seen]) > GAP) + 1)
     longest = max(parts, key=len)
     if np.ptp(one.time[longest]) < ENOUGH:

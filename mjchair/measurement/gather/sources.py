@@ -126,13 +126,14 @@ def find_sources(folder: Path, mappings: Sequence[Path] = ()) -> Found:
         inside = path.relative_to(folder)
         if not path.is_file() or path.name == PLAN or len(inside.parts) > DEEPEST:
             continue
-        if path.suffix.lower() in EXPORTED and not path.name.startswith("."):
-            unused.append(f"{inside} is not used: export it as CSV, Parquet, C3D or TRC")
-        if path.suffix.lower() not in SUFFIXES or path.name.startswith("."):
+        if path.suffix.lower() not in (*SUFFIXES, *EXPORTED) or path.name.startswith("."):
             continue
         if (path.parent / LOG).is_file():  # a study that was gathered before, no raw files
             continue
         if path.stem.lower() in PAPERS:
+            continue
+        if path.suffix.lower() in EXPORTED:
+            unused.append(f"{inside} is not used: export it as CSV, Parquet, C3D or TRC")
             continue
         kind, form, file, why = _kind(path, formats)
         if not kind:

@@ -36,7 +36,7 @@ def estimated(trial: GatheredTrial, motion: Instrument, known: Known) -> Gathere
     sos = butter(2, min(CUTOFF, 0.4 * rate), fs=rate, output="sos")
     seen = radius * motion.speed
     if motion.ground is not None:
-        there = np.isfinite(motion.ground)
+        there = motion.seen
         seen = np.interp(motion.time, motion.time[there], motion.ground[there])
     speed = sosfiltfilt(sos, seen, padlen=min(100, seen.size - 2))
     gained = SPIN * mass * np.gradient(speed, motion.time)
