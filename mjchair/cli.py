@@ -149,4 +149,5 @@ def _line(error: Exception) -> str:
         return text
     if isinstance(error, OSError):
         return f"{error.filename}: {error.strerror}" if error.filename else text
-    return f"{type(error).__name__}: {text}; this is a fault of mjchair, see it with --traceback"
+    fault = "this is a fault of mjchair, see it with mjchair --traceback ..."
+    return f"{type(error).__name__}: {text}; {fault}"

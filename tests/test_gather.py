@@ -572,6 +572,28 @@ def test_a_table_of_both_wheels_is_called_and_drawn_as_both(tmp_path):
     assert lines[0].get_color() != lines[1].get_color()
 
 
+def test_a_table_of_an_accelerometer_in_the_axes_of_the_chair_is_joined_and_drawn(tmp_path):
+    """With samples that are missing; its own clock begins 1.5 s later."""
+    from mjchair.report.gathered import gathered_figure
+
+    rng = np.random.default_rng(3)
+    time = np.arange(0.0, 15.0, 0.01)
+    gains = np.interp(time, np.linspace(0.0, 15.0, 40), rng.normal(size=40))
+    speed = 4.0 + np.cumsum(gains) * 0.01
+    wheel = np.column_stack([time, speed])
+    np.savetxt(tmp_path / "run_enc.csv", wheel, "%.6g", ",", header="time,left_wheel_speed",
+               comments="")  # fmt: skip
+    rows = [f"{t - 1.5:.2f},{0.3 * g:.4f}" for t, g in zip(time, gains, strict=True) if t >= 1.5]
+    rows[200] = rows[200].split(",")[0] + ","
+    (tmp_path / "run_imu.csv").write_text("\n".join(["time,imu_accelerometer.x", *rows]) + "\n")
+    (trial,) = gather(tmp_path).trials
+    (found,) = trial.alignments.values()
+    assert found.offset == pytest.approx(1.5, abs=0.02)
+    summed = gathered_figure([trial]).axes[0].get_lines()[-1]
+    assert summed.get_label() == "run_imu.csv, acceleration summed"
+    np.testing.assert_allclose(summed.get_ydata(), speed[150:][np.arange(1350) != 200], atol=0.2)
+
+
 def test_a_code_for_missing_samples_is_no_speed(tmp_path):
     (tmp_path / "run.csv").write_text(table_of(code=-9999.0))
     gathered = gather(tmp_path)
@@ -779,11 +801,36 @@ def test_gravity_is_read_where_the_chair_stands_and_not_where_it_speeds_up():
     )
 
     def leans(rest):
-        sits = imu.mounting(time, signal, (time, gains), rest)
+        speed = np.cumsum(gains) * 0.01
+        sits = imu.mounting(time, signal, np.zeros_like(signal), (time, speed), rest)
         return abs(np.mean((signal @ sits.axes.T)[:, 0] - gains))
 
     assert leans(time < 2.0) < 1e-3
     assert leans(None) > 0.1  # by what the chair loses most of the time
+
+
+@pytest.mark.parametrize("turns", [0.0, 0.8], ids=["straight", "slalom"])
+def test_forward_is_told_in_a_straight_run_and_in_a_slalom(turns):
+    """Where the frame shakes askew, sideways and forward alike, and much more than it speeds up."""
+    from mjchair.measurement import imu
+
+    rng = np.random.default_rng(8)
+    time = np.arange(0.0, 20.0, 0.01)
+    speed = 1.0 + 0.2 * np.sin(2.0 * time)
+    yaw_rate = turns * np.sin(2.0 * time + 0.5)  # turns as it slows down
+    gains, aside = np.gradient(speed, time), speed * yaw_rate
+    shakes = 1.5 * rng.normal(size=time.size)
+    askew = np.radians(37.0)
+    c, s = np.cos(askew), np.sin(askew)
+    x, y = gains + shakes, aside - shakes + 0.1 * rng.normal(size=time.size)
+    signal = np.column_stack([c * x + s * y, c * y - s * x, np.full(time.size, imu.GRAVITY)])
+    gyroscope = np.column_stack([np.zeros((time.size, 2)), yaw_rate])
+    wheels = (time, speed / 0.3 + 0.01 * rng.normal(size=time.size))
+    sits = imu.mounting(time, signal, gyroscope, wheels)
+    assert sits.axes[0] == pytest.approx([c, -s, 0.0], abs=np.radians(12.0))
+    assert np.degrees(np.arctan2(-sits.axes[0, 1], sits.axes[0, 0])) == pytest.approx(
+        37.0, abs=3.0 if turns else 12.0
+    )
 
 
 def test_the_chair_rests_where_the_wheels_that_are_recorded_do():

@@ -114,24 +114,43 @@ def upright(accelerometer: Array, rest: NDArray[np.bool_] | None = None) -> Arra
 def mounting(
     time: Array,
     accelerometer: Array,
+    gyroscope: Array,
     wheels: tuple[Array, Array] | None,
     rest: NDArray[np.bool_] | None = None,
 ) -> Mounting:
     """How a sensor on the frame sits.
 
+    A chair on wheels is accelerated forward as its wheels speed up, and to the left by its speed
+    times its yaw rate. Forward is where both fit best, by one angle.
+
     Args:
-      time: (n,), s. accelerometer: (n, 3), m/s^2. wheels: times (s) on the same clock and the
-        wheels' acceleration there, any unit; None: forward is the level axis that varies most.
+      time: (n,), s. accelerometer: (n, 3), m/s^2. gyroscope: (n, 3), rad/s. wheels: times (s) on
+        the same clock and the wheels' speed there, any unit; None: forward is the level axis that
+        varies most.
       rest: (n,), where the chair stands; None: not known.
     """
     axes = upright(accelerometer, rest)
     level = (accelerometer @ axes.T)[:, :2]
     level = level - level.mean(axis=0)
     if wheels is not None:
-        gained = np.interp(time, *wheels, left=0.0, right=0.0)
-        forward = np.linalg.lstsq(level, gained - gained.mean(), rcond=None)[0]
+        gains, aside = _accelerations(time, gyroscope @ axes[2], wheels)
+        forward = level.T @ gains + (level[:, ::-1] * [1.0, -1.0]).T @ aside
     else:
         forward = np.linalg.svd(level, full_matrices=False)[2][0]
     forward = forward / np.linalg.norm(forward)
     x = forward @ axes[:2]
     return Mounting(np.stack([x, np.cross(axes[2], x), axes[2]]), wheels is not None)
+
+
+def _accelerations(
+    time: Array, yaw_rate: Array, wheels: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """Acceleration (n,) forward and to the left without their means, in the wheels' unit a second.
+
+    They are 0 where the wheels are not recorded.
+    """
+    clock, speed = wheels
+    recorded = (time >= clock[0]) & (time <= clock[-1])
+    gains = np.interp(time, clock, np.gradient(speed, clock)) * recorded
+    aside = np.interp(time, clock, speed) * yaw_rate * recorded
+    return gains - gains.mean(), aside - aside.mean()

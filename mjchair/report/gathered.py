@@ -102,14 +102,15 @@ def _forward(axes: Axes, trial: GatheredTrial) -> None:
     motion = next((i for i in trial.instruments if i.speed is not None), None)
     if frame is None or motion is None or motion.speed is None:
         return
-    pull = frame.channels["imu_accelerometer.x"]
-    gained = cumulative_trapezoid(pull, frame.time, initial=0.0)
-    wheel = np.interp(frame.time, motion.time, motion.speed)
-    line = frame.time - frame.time.mean()
+    there = np.isfinite(frame.channels["imu_accelerometer.x"])
+    time, pull = frame.time[there], frame.channels["imu_accelerometer.x"][there]
+    gained = cumulative_trapezoid(pull, time, initial=0.0)
+    wheel = np.interp(time, motion.time, motion.speed)
+    line = time - time.mean()
     terms = np.column_stack([gained, np.ones_like(line), line, line**2])
     fitted = terms @ np.linalg.lstsq(terms, wheel, rcond=None)[0]
     axes.plot(
-        frame.time - trial.begin, fitted, lw=0.9, color=SERIES[1],
+        time - trial.begin, fitted, lw=0.9, color=SERIES[1],
         label=f"{frame.name}, acceleration summed",
     )  # fmt: skip
 

@@ -158,6 +158,10 @@ def _by_motion(ours: Sequence[Instrument], other: Instrument) -> Alignment:
             return found
         two = _in_unit_of(reference, other, _course(other))
         return clocks.align_slowing(_course(reference), two) or clocks.align(one, two, names)
+    ahead = other.channels.get("imu_accelerometer.x")
+    if ahead is not None:
+        there = np.isfinite(ahead)
+        return clocks.align(_gained(ours), Signal(other.time[there], ahead[there, None]), names)
     if other.accelerometer is None:
         raise MjchairError(
             f"the clocks of {names[0]} and {names[1]} cannot be aligned: {names[1]} shows no "
@@ -257,13 +261,19 @@ def _in_unit_of(reference: Instrument, other: Instrument, speed: Signal) -> Sign
 
 
 def _gained(ours: Sequence[Instrument]) -> Signal:
-    """How the chair speeds up by its wheels, rad/s^2; the mean of the sides that are there."""
+    """How the wheels speed up, rad/s^2."""
+    time, speed = _rolls(ours)
+    return Signal(time, np.gradient(speed, time))
+
+
+def _rolls(ours: Sequence[Instrument]) -> Signal:
+    """How fast the wheels turn, rad/s; the mean of the sides that are there."""
     time = ours[0].time
     moving = [one for one in ours if one.speed is not None]
     moving = [one for one in moving if one.ground is None] or moving
     sides = {one.side: one for one in reversed(moving)}
     speeds = [np.interp(time, w.time, w.speed) for w in sides.values() if w.speed is not None]
-    return Signal(time, np.gradient(np.mean(speeds, axis=0), time))
+    return Signal(time, np.mean(speeds, axis=0))
 
 
 def _frames(ours: list[Instrument]) -> tuple[list[Instrument], list[str]]:
@@ -290,7 +300,8 @@ def _frame(one: Instrument, ours: Sequence[Instrument]) -> tuple[Instrument, lis
     moving = [w for w in ours if w.speed is not None]
     rest = _at_rest(one.time, moving)
     gyroscope, notes = imu.without_offset(one.time, one.gyroscope, rest, one.name)
-    sits = imu.mounting(one.time, one.accelerometer, _gained(ours) if moving else None, rest)
+    wheels = _rolls(ours) if moving else None
+    sits = imu.mounting(one.time, one.accelerometer, gyroscope, wheels, rest)
     how = "as the wheels speed up" if sits.told else "the level axis that varies most, assumed"
     rows = [
         f"{a} ({', '.join(f'{v:+.2f}' for v in r)})" for a, r in zip("xyz", sits.axes, strict=True)
