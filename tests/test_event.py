@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 import mjchair
-from mjchair.diagnosis import decide
+from mjchair.diagnosis import notes
 from mjchair.diagnosis.explain import event
 from mjchair.diagnosis.explain.column_ids import Driver, ForceColumn, ForceGroup, Quantity
 from mjchair.diagnosis.replay.pulses import Force
@@ -62,8 +62,8 @@ def test_where_a_chair_gains_speed_without_torque_somebody_may_have_pushed_all_a
 
 def test_what_to_do_about_an_event_is_to_cut_it_out_but_not_a_whole_run():
     """Where somebody may have pushed all along, the next step is to leave the run out."""
-    note = decide._happened_once(event.Event(gain=95.0, trial="a", begin=1, end=3), share=0.9)
+    note = notes.of_event(event.Event(gain=95.0, trial="a", begin=1, end=3), share=0.9)
     assert "between 1 and 3 s" in note and "90%" in note
     assert note.endswith("cut the trial there")
     pushed = event.Event(gain=165.0, trial="a", begin=0, end=5, whole=True)
-    assert "cut" not in decide._happened_once(pushed, share=0.9)
+    assert "cut" not in notes.of_event(pushed, share=0.9)

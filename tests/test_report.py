@@ -26,6 +26,7 @@ from mjchair.diagnosis.result import (
     Moved,
     NamedEffect,
     Nearest,
+    OneRun,
     TrialGap,
     WholeRun,
     WindowGaps,
@@ -191,6 +192,18 @@ def test_no_share_of_a_gap_is_shown_where_there_is_none():
     assert ">closes<" not in page(none, {}) and "|cos|" not in page(none, {})
     assert ">|cos|<" in page(diagnosis(), {})
     assert "closes" not in str(candidates.figure(none).axes[-1].get_xlabel())
+
+
+def test_what_acts_in_one_run_alone_is_said_with_the_run_and_the_sizes():
+    rubs = Estimate(value=0.58, std=0.04, unit="N m")
+    brake = NamedEffect(name="bearing_friction", parameters={"left": rubs}, closure=1.0)
+    one = OneRun(trial="coast_2", effects=(brake,), gain=189.0, others=184.0)
+    found = dataclasses.replace(diagnosis(Verdict.UNKNOWN), one_run=one)
+    said = words.missing(found)
+    assert said.startswith("coast_2 differs from the other runs")  # a name keeps its letters
+    assert "left 0.580 ± 0.040 N m" in said and said.endswith("so nothing is named.")
+    assert "coast_2" in words.choice_words(found) and "nearest" not in words.choice_words(found)
+    assert "coast_2 differs from the other runs" in page(found, {})
 
 
 def test_what_the_corrected_chair_has_besides_is_to_be_measured_first():

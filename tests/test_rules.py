@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mjchair.diagnosis import decide, rules
+from mjchair.diagnosis import notes, rules
 from mjchair.diagnosis.result import Estimate
 from mjchair.diagnosis.rules import HeldOut, Standing, Verdict
 from mjchair.report.diagnosis_words import nothing_missing, turn_words
@@ -160,11 +160,11 @@ def test_held_out_runs_that_contradict_an_answer_are_named_beside_what_it_closes
     effect = SimpleNamespace(effect=SimpleNamespace(key="air_drag"))
     choice = SimpleNamespace(fitted=SimpleNamespace(variant=SimpleNamespace(terms=[effect])))
     held = HeldOut(before=400.0, after=900.0, dof=100.0, changed=600.0)
-    note = decide._no_answer(choice, replace(CLEAR, closure=1.0, held_out=held))
+    note = notes.no_answer(choice, replace(CLEAR, closure=1.0, held_out=held))
     assert "air_drag, closes 100% of it on the runs" in note
     assert note.endswith("2.00 of the noise without it and 3.00 with it")
     kept = replace(held, after=150.0)
-    assert "contradict" not in decide._no_answer(choice, replace(CLEAR, held_out=kept))
+    assert "contradict" not in notes.no_answer(choice, replace(CLEAR, held_out=kept))
 
 
 def test_what_brings_a_held_out_gap_into_the_noise_is_no_worse_than_nothing():

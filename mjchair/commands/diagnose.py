@@ -33,6 +33,7 @@ TOP = (
     "next_experiment",
     "probability",
     "more_missing",
+    "one_run",
     "material",
     "process",
     "drivers",

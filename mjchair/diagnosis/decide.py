@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from mjchair.diagnosis import rules
+from mjchair.diagnosis import notes, rules
 from mjchair.diagnosis.evidence import evidence, missing_forces
 from mjchair.diagnosis.explain import event, hypotheses, missing_force
 from mjchair.diagnosis.explain.calibration import NONE
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Choice, closure
-from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.explain.gap import Gap, forces_left
 from mjchair.diagnosis.explain.left_out import (
     gap_foretold,
@@ -32,16 +31,22 @@ from mjchair.diagnosis.explain.left_out import (
     over_noise,
     slow_part,
 )
-from mjchair.diagnosis.explain.probability import of_any, of_effects, probabilities, with_gap
+from mjchair.diagnosis.explain.one_run import InOneRun, in_one_run
+from mjchair.diagnosis.explain.probability import (
+    of_any,
+    of_effects,
+    probabilities,
+    with_gap,
+    with_one_run,
+)
 from mjchair.diagnosis.explain.rivals import exchanged, with_probable
-from mjchair.diagnosis.explain.run_by_run import Uneven, uneven
+from mjchair.diagnosis.explain.run_by_run import uneven
 from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.process import NAMED, level
 from mjchair.diagnosis.fit.slow_part import BAND
-from mjchair.diagnosis.fit.variant import Term
 from mjchair.diagnosis.material import material
 from mjchair.diagnosis.next_experiment import design, wording
 from mjchair.diagnosis.next_experiment.design import Plan
@@ -54,6 +59,7 @@ from mjchair.diagnosis.result import (
     MissingForce,
     NamedEffect,
     Nearest,
+    OneRun,
     Stages,
 )
 from mjchair.diagnosis.rules import Verdict
@@ -61,7 +67,6 @@ from mjchair.effects.effect import Parameter
 from mjchair.errors import MjchairError
 
 Array = NDArray[np.float64]
-TOP = 3  # drivers of a missing force that are worth a word
 SHOWN = 12  # windows and channels that are listed
 LEFT = 3.0  # sigmas of a missing force that is listed
 FORCES = 8  # of them
@@ -75,7 +80,9 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     choice = with_probable(choice, probability) if choice else None
     differing = uneven(base.bench, choice.fitted, choice.brought) if choice else []
     stands = standing(base, choice, closed, probability) if choice else None
-    stands = replace(stands, uneven=bool(differing)) if stands else None
+    alone = in_one_run(base, choice) if gap.exists else None
+    if stands:
+        stands = replace(stands, uneven=bool(differing), one_run=alone is not None)
     said = rules.verdict(gap.exists, stands)
     forces = missing_forces(base)
     size = material(base, gap, choice)
@@ -95,6 +102,9 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         said = Verdict.NONE
     if (said == Verdict.UNKNOWN and choice is None) or rules.surely(gap.p):
         probability = with_gap(probability, gap.p)
+    alone = alone if said == Verdict.UNKNOWN else None
+    if alone is not None:
+        probability = with_one_run(probability, alone.by)
     named = choice if said in (Verdict.NAMED, Verdict.AMBIGUOUS) else None
     left = missing(choice.after if choice else gap)
     undecided = named if said == Verdict.AMBIGUOUS else None
@@ -109,14 +119,15 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         candidates=_candidates(base, gap, choice),
         gap=_summary(base, gap, named, stands.held_out if stands else None),
         where=_where(base),
-        next_experiment=_following(base, choice, said, plan, left),
+        next_experiment=_following(base, choice, said, plan, left, alone),
         notes=[
-            *_notes(base, gap, choice, stands, said, left),
-            *(_differs(d) for d in differing if named),
+            *notes.notes_on(base, gap, choice, stands, said=said, left=left, alone=alone),
+            *(notes.of_uneven(d) for d in differing if named),
             *unplanned,
         ],
         drivers=left,
         nearest=_nearest(base, choice, closed) if choice and said == Verdict.UNKNOWN else None,
+        one_run=_in_one_run(alone, gap) if alone else None,
         probability=probability,
         more_missing=bool(named and stands and rules.more_missing(stands)),
         material=size,
@@ -128,15 +139,29 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     )
 
 
-def _differs(one: Uneven) -> str:
-    """That an effect is not of one size."""
-    least, most = (
-        f"{size.value:.3g} ± {size.std:.1g} in {size.run}" for size in (one.least, one.most)
-    )
-    return (
-        f"{one.effect} is not of one size in these runs: its {one.parameter} is {most} and "
-        f"{least}; it may act in some of them only, as a brake that rubs or another floor does"
-    )
+def _in_one_run(found: InOneRun, gap: Gap) -> OneRun:
+    """What acts in one run alone, with the sizes that linear algebra gives it."""
+    effects = []
+    for option in found.options:
+        term, std = found.term(option)
+        parameters = {
+            name: Estimate(
+                value=float(term.values[name]),
+                std=std.get(name),
+                unit=term.effect.parameter(name).unit,
+            )
+            for name in term.free
+        }
+        closed = min(option.gain / max(gap.excess, option.gain), 1.0)
+        effects.append(
+            NamedEffect(
+                name=term.effect.name,
+                parameters=parameters,
+                closure=closed,
+                channel=term.effect.channel,
+            )
+        )
+    return OneRun(trial=found.trial, effects=tuple(effects), gain=found.gain, others=found.others)
 
 
 def _walls(fitted: Fitted) -> int:
@@ -251,10 +276,13 @@ def _following(
     said: Verdict,
     plan: Plan | None,
     left: list[MissingForce],
+    alone: InOneRun | None,
 ) -> str:
     """The next experiment in words; empty where none is needed."""
     if plan is not None:
         return wording.deciding(plan, base.bench.simulator)
+    if said == Verdict.UNKNOWN and alone is not None:
+        return wording.leaving_out(alone.trial)
     if said == Verdict.UNKNOWN:
         lone = lone_run(base, choice.fitted if choice else base.plain)
         if lone is not None:
@@ -318,7 +346,7 @@ def _named(fitted: Fitted, closed: float) -> list[NamedEffect]:
                 parameters=parameters,
                 closure=closed,
                 channel=channel,
-                remark=_remark(fitted, term),
+                remark=notes.remark(fitted, term),
             )
         )
     return out
@@ -403,84 +431,3 @@ def missing(gap: Gap) -> list[MissingForce]:
         for group, sigmas in forces_left(gap)
         if sigmas > LEFT
     ][:FORCES]
-
-
-def _remark(fitted: Fitted, term: Term) -> str:
-    """What the values of an effect say in a sentence; empty where they say it themselves."""
-    if term.effect.remark is None:
-        return ""
-    std = {p.name: fitted.std.get(key, 0.0) for key, p in term.parameters}
-    return term.effect.remark(term.values, std)
-
-
-def _no_answer(choice: Choice, stands: rules.Standing) -> str:
-    """A note on the nearest effects, which are no answer."""
-    names = " and ".join(t.effect.key for t in choice.fitted.variant.terms)
-    nearest = (
-        f"nothing in the library explains the gap; the nearest, {names}, closes "
-        f"{stands.closure:.0%} of it on the runs that it was fitted to"
-    )
-    held = stands.held_out
-    if held is None or not rules.opens_a_gap(held):
-        return nearest
-    before, after = (math.sqrt(chi2 / held.dof) for chi2 in (held.before, held.after))
-    return (
-        f"{nearest}, but the held-out runs contradict it: their slow residual is {before:.2f} of "
-        f"the noise without it and {after:.2f} with it"
-    )
-
-
-def _happened_once(once: event.Event, share: float) -> str:
-    """A note on an event that alone brings this share of what any test shows."""
-    of_all = f"{share:.0%} of what any test shows"
-    if once.whole:
-        return f"it may be pushes that nobody measured: forces in {once.trial} alone bring {of_all}"
-    return (
-        f"it may have happened once: a force in {once.trial} between {once.begin} and {once.end} s "
-        f"alone brings {of_all}; if something touched the chair then, cut the trial there"
-    )
-
-
-def _notes(
-    base: Base,
-    gap: Gap,
-    choice: Choice | None,
-    stands: rules.Standing | None,
-    said: Verdict,
-    left: list[MissingForce],
-) -> list[str]:
-    study = base.bench.simulator.study
-    notes = list(study.notes)
-    if study.unplaced:
-        notes.append(
-            f"where {', '.join(study.unplaced)} starts is neither measured nor given; no place on "
-            "the floor is looked for, such as a surface_patch ([trial.initial] gives a position)"
-        )
-    for channel, noise in base.bench.noise.items():
-        if noise.source != "study.toml" and channel not in study.copied:
-            notes.append(f"noise of {channel}: {noise.total:.3g} (SI), from {noise.source}")
-    notes += base.dropped
-    notes += choice.dropped if choice else []
-    notes += [
-        f"{name} stands at {bounded.WALL:g} standard deviations from what the study says of it: "
-        "something is missing there, or the study is wrong about it"
-        for name in (bounded.at_walls(choice.fitted.variant.offsets) if choice else [])
-    ]
-    if choice is not None and said in (Verdict.NAMED, Verdict.AMBIGUOUS):
-        terms = choice.fitted.variant.terms
-        said_of = [(term.effect.name, _remark(choice.fitted, term)) for term in terms]
-        notes += [f"{name}: {line}" for name, line in said_of if line]
-    if said != Verdict.UNKNOWN:
-        return notes
-    if choice is not None and stands is not None:
-        notes.append(_no_answer(choice, stands))
-    once = event.largest(base)
-    most = max((t.statistic for t in gap.tests), default=0.0)
-    if rules.happened_once(event=once.gain, gain=most):
-        notes.append(_happened_once(once, min(once.gain / most, 1.0)))
-    elif any(force.goes_with.quantity == Quantity.STROKE for force in left[:TOP]):
-        notes.append(
-            "the missing force comes back with every stroke: chair and rider are not one rigid "
-            "body, and what of the rider moves, and how heavy it is, these channels do not tell"
-        )
-    return notes

@@ -241,6 +241,30 @@ class Nearest:
 
 
 @dataclass(frozen=True, kw_only=True)
+class OneRun:
+    """Effects that explain more by acting in one run alone than any that act in all runs.
+
+    Attributes:
+      trial: name of the run. effects: any one of them, best first, by linear algebra.
+      gain: chi2 that the best brings. others: that effects bring which act in all runs.
+    """
+
+    trial: str
+    effects: tuple[NamedEffect, ...]
+    gain: float
+    others: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in diagnosis.json."""
+        return {
+            "trial": self.trial,
+            "effects": [effect.to_dict() for effect in self.effects],
+            "gain": round(self.gain, 1),
+            "others": round(self.others, 1),
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
 class ForceSamples:
     """The force that would close the gap, at knots along the windows.
 
@@ -324,6 +348,7 @@ class Diagnosis:
       where: where the disagreement is. next_experiment: what would decide.
       notes: what was assumed or noticed. drivers: what the force that is missing goes with.
       nearest: the explanation that comes nearest where none is named.
+      one_run: what acts in one run alone, where that explains more; the verdict is unknown then.
       probability: of every hypothesis; a pair is "a+b". more_missing: whether the effects leave
         something that is no noise. material: the largest missing force, and what matters.
       process: drive, side, yaw, wheel_turn, caster_turn -> standard deviation of what shakes the
@@ -343,6 +368,7 @@ class Diagnosis:
     notes: list[str] = field(default_factory=list)
     drivers: list[MissingForce] = field(default_factory=list)
     nearest: Nearest | None = None
+    one_run: OneRun | None = None
     probability: dict[str, float] = field(default_factory=dict)
     more_missing: bool = False
     material: Material | None = None
@@ -360,6 +386,7 @@ class Diagnosis:
             "alternatives": self.alternatives,
             "candidates": [c.to_dict() for c in self.candidates],
             "gap": asdict(self.gap) if self.gap else {},
+            "one_run": self.one_run.to_dict() if self.one_run else None,
             "where": [{**asdict(w), "window": list(w.window)} for w in self.where],
             "next_experiment": self.next_experiment,
             "probability": {name: round(p, 4) for name, p in self.probability.items()},

@@ -134,6 +134,7 @@ class Standing:
       walls: how many numbers that are only roughly known stand on their walls with the effects in:
         they are where what is missing pushed them.
       uneven: whether an effect is not of one size in all runs.
+      one_run: whether another, in one run alone, explains more.
     """
 
     closure: float
@@ -148,6 +149,7 @@ class Standing:
     held_out: HeldOut | None = None
     walls: int = 0
     uneven: bool = False
+    one_run: bool = False
 
 
 def gap_exists(p: float, sigmas: float, gain: float = 0.0) -> bool:
@@ -195,7 +197,7 @@ def verdict(gap: bool, choice: Standing | None) -> Verdict:
 
 def explains(choice: Standing) -> bool:
     """Whether the effects are an answer, alone or beside their rivals, with a remainder or not."""
-    if choice.closure < PARTLY:
+    if choice.closure < PARTLY or choice.one_run:
         return False
     if choice.held_out is None:
         return choice.gain_by_run >= HELD
@@ -280,6 +282,16 @@ def differs_by_run(*, gained: float, free: int, brought: float) -> bool:
     if free < 1 or gained < UNEVEN * brought:
         return False
     return bool(stats.chi2.sf(max(gained, 0.0), free) < BY_CHANCE)
+
+
+def is_of_one_run(*, by: float, gain: float) -> bool:
+    """Whether an effect that acts in one run alone explains more than what acts in all runs.
+
+    Args:
+      by: chi2, with penalties, by which it is better than the best that acts in all of them.
+      gain: chi2 that it brings, by linear algebra.
+    """
+    return by > max(WORTH, LINEAR * gain)
 
 
 def more_missing(choice: Standing) -> bool:

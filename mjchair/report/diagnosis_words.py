@@ -10,9 +10,9 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from mjchair.diagnosis.explain.calibration import NONE
+from mjchair.diagnosis.explain.calibration import NONE, OUTSIDE
 from mjchair.diagnosis.explain.column_ids import Quantity
-from mjchair.diagnosis.explain.probability import of_effects
+from mjchair.diagnosis.explain.probability import ONE_RUN, of_effects
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.process import Part
 from mjchair.diagnosis.next_experiment.wording import MEASURED, measured, plain
@@ -23,6 +23,7 @@ from mjchair.diagnosis.result import (
     Estimate,
     MissingForce,
     NamedEffect,
+    OneRun,
 )
 from mjchair.diagnosis.rules import LEVEL, LIKELY, PARTLY, PROBABLE, Verdict
 from mjchair.units import with_unit
@@ -36,6 +37,7 @@ NOTABLE = 1.5  # times the noise: where a correction leaves more, what can expla
 A_GAP = 0.8  # of what a correction leaves: where no more than this is a gap, the rest is explained
 FAINT = 1e-3  # of the loudest: less of what shakes a chair is nothing
 MUCH = 0.15  # share by which a fit moved what a person can measure, worth a word beside a name
+ALIKE = 3  # effects in one run alone that a sentence names
 UNSURE = 0.005  # probabilities below this are not named
 
 
@@ -47,7 +49,18 @@ def missing(diagnosis: Diagnosis) -> str:
         return remainder_words(diagnosis) + _capital(found_words(diagnosis.effects)) + "."
     if diagnosis.verdict == Verdict.AMBIGUOUS:
         return remainder_words(diagnosis) + _undecided(diagnosis)
+    if diagnosis.one_run is not None:
+        return one_run_words(diagnosis.one_run)
     return "A force is missing that no effect of the library explains, so none is named."
+
+
+def one_run_words(one: OneRun) -> str:
+    """What acts in one run alone, and that it is no answer for all runs, as one sentence."""
+    any_of = " or ".join(map(effect_words, one.effects[:ALIKE]))
+    return (
+        f"{one.trial} differs from the other runs: {any_of} in {one.trial} alone explains "
+        "these runs better than what acts in all of them, so nothing is named."
+    )
 
 
 def _undecided(diagnosis: Diagnosis) -> str:
@@ -283,7 +296,11 @@ def explanations(diagnosis: Diagnosis) -> list[Explanation]:
 
 def hypothesis_words(name: str) -> str:
     """A hypothesis of `probability` in words."""
-    known = {"none": "nothing missing", "outside": "something outside the library"}
+    known = {
+        NONE: "nothing missing",
+        OUTSIDE: "something outside the library",
+        ONE_RUN: "an effect in one run alone",
+    }
     return known.get(name, " and ".join(plain_name(n) for n in name.split("+")))
 
 
@@ -397,6 +414,8 @@ def choice_words(diagnosis: Diagnosis) -> str:
         f"None is named. An answer closes at least {PARTLY:.0%} of the gap and holds on "
         f"{other_runs(diagnosis)}; no effect, nor two or three together, does both. "
     )
+    if diagnosis.one_run is not None:
+        return f"{one_run_words(diagnosis.one_run)} Section 2 is what is known of it."
     return rules + nearest_words(diagnosis) + "Section 2 is what is known of the force."
 
 

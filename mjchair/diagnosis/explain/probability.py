@@ -29,6 +29,7 @@ from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.replay.pulses import Force
 
 Array = NDArray[np.float64]
+ONE_RUN = "one_run"  # an effect that acts in one run alone
 SIZES = 2.0  # sizes worth finding: standard deviation of a parameter before any data
 SPREAD = {Force.FORWARD: 5.0, Force.YAW: 1.5}  # N, N m: the same of a force outside the library
 # before any data (assumptions); what is left goes to one effect
@@ -70,6 +71,17 @@ def with_gap(probability: Mapping[str, float], p: float) -> dict[str, float]:
     outside = probability.get(OUTSIDE, 0.0) + probability.get(NONE, 0.0) - chance
     out = {**probability, NONE: chance, OUTSIDE: outside}
     return dict(sorted(out.items(), key=lambda item: -item[1]))
+
+
+def with_one_run(probability: Mapping[str, float], by: float) -> dict[str, float]:
+    """Probabilities where an effect in one run alone explains more, as another hypothesis, ONE_RUN.
+
+    Args:
+      probability: of hypotheses. by: chi2, with penalties, by which it is better than the best.
+    """
+    share = math.exp(-0.5 * by)
+    out = {name: p * share for name, p in probability.items()}
+    return {ONE_RUN: 1.0 - sum(out.values()), **out}
 
 
 def of_effects(probability: Mapping[str, float], keys: Sequence[str]) -> float:

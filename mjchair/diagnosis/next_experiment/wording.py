@@ -197,6 +197,15 @@ def letting_in(run: str, left: float, others: float) -> str:
     )
 
 
+def leaving_out(run: str) -> str:
+    """What to do where one run differs from the others, by its name."""
+    return (
+        f"Diagnose again without {run}, which differs from the other runs, and look at what was "
+        "different then: a brake that rubs, another floor, a tire that lost air, somebody who "
+        "pushes. Repeat the run once that is mended."
+    )
+
+
 def searching(drivers: Sequence[tuple[Driver, float]], pushed: Collection[str] = ()) -> str:
     """What to do about a force that no effect explains.
 

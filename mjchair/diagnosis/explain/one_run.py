@@ -1,0 +1,98 @@
+"""An effect that acts in one run alone: a brake that rubs, another floor, a tire that lost air.
+
+In: the screened columns, and the choice of effects that act in all runs. Out: the effects that
+explain more by acting in one run than any choice does by acting in all. The other runs rule these
+out: where they only do not show an effect, it brings as much in all runs, and is no finding here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import hypotheses
+from mjchair.diagnosis.explain.choice import Choice
+from mjchair.diagnosis.explain.hypotheses import Hypothesis
+from mjchair.diagnosis.explain.screening import Base, gain
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.bounded import Reduced
+from mjchair.diagnosis.fit.system import System
+from mjchair.diagnosis.fit.variant import Term
+from mjchair.effects.effect import step
+
+
+@dataclass(frozen=True, kw_only=True)
+class InOneRun:
+    """Effects, each of which explains most of the gap by acting in one run alone.
+
+    Attributes:
+      trial: name of the run. reduced: the linear algebra of columns that act there alone.
+      options: one effect each, best first; these runs do not tell them apart.
+      gain: chi2 that the best brings. others: that the choice brings in all runs.
+      by: chi2 by which the best is better, both less what their parameters must bring.
+    """
+
+    trial: str
+    reduced: Reduced
+    options: list[Hypothesis]
+    gain: float
+    others: float
+    by: float
+
+    def term(self, option: Hypothesis) -> tuple[Term, dict[str, float]]:
+        """One of the effects, and standard errors of its sizes where linear algebra tells them."""
+        (start,) = option.starts
+        (term,) = hypotheses.terms(self.reduced, option)
+        if start.effect.seeds is not None or len(start.columns) != len(start.free):
+            return term, {}
+        at = self.reduced.index(start.columns)
+        errors = np.sqrt(np.diag(np.linalg.inv(self.reduced.G[np.ix_(at, at)])))
+        sizes = [abs(step(start.effect.parameter(name))) for name in start.free]
+        return term, dict(zip(start.free, (errors * sizes).tolist(), strict=True))
+
+
+def in_one_run(base: Base, choice: Choice | None) -> InOneRun | None:
+    """Effects that explain more in one run alone; None: nothing does, or there is one run."""
+    fitted = choice.fitted if choice else base.plain
+    price = fitted.total + (choice.hypothesis.penalty if choice else 0.0)
+    found = max(_runs(base), key=lambda run: run[2][0].score, default=None)
+    if found is None:
+        return None
+    trial, reduced, options = found
+    best = options[0]
+    by = price - (base.reduced.total - best.score)
+    if not rules.is_of_one_run(by=by, gain=best.gain):
+        return None
+    alike = [h for h in options if best.gain - h.gain < rules.not_ruled_out(gain=best.gain)]
+    return InOneRun(
+        trial=trial,
+        reduced=reduced,
+        options=alike,
+        gain=base.plain.total - base.reduced.total + best.gain,
+        others=gain(base, fitted),
+        by=by,
+    )
+
+
+def _runs(base: Base) -> Iterator[tuple[str, Reduced, list[Hypothesis]]]:
+    """Each run of the fit: name, linear algebra of columns that act there alone, and effects."""
+    windows, runs = base.bench.windows, base.bench.simulator.study.runs
+    fitted = np.unique(base.system.run[windows])
+    for run in fitted if len(fitted) > 1 else ():
+        reduced = bounded.reduce(_alone(base.system, run), windows)
+        options = hypotheses.singles(reduced, base.starts)
+        if options:
+            yield runs[run].trial.name, reduced, options
+
+
+def _alone(system: System, run: int) -> System:
+    """The system in which nothing but what is only roughly known acts outside one run."""
+    first, outside = system.nuisance, system.run != run
+    G, b = system.G.copy(), system.b.copy()
+    G[outside, first:, :] = 0.0
+    G[outside, :, first:] = 0.0
+    b[outside, first:] = 0.0
+    return replace(system, G=G, b=b)

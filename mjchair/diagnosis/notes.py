@@ -1,0 +1,144 @@
+"""Notes of a diagnosis: what was assumed or noticed, one sentence each.
+
+In: the chair as it was with its gap, the choice of effects and the verdict. Out: lines of text.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import event
+from mjchair.diagnosis.explain.choice import Choice
+from mjchair.diagnosis.explain.column_ids import Quantity
+from mjchair.diagnosis.explain.gap import Gap
+from mjchair.diagnosis.explain.one_run import InOneRun
+from mjchair.diagnosis.explain.run_by_run import Uneven
+from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.nonlinear import Fitted
+from mjchair.diagnosis.fit.variant import Term
+from mjchair.diagnosis.result import MissingForce
+from mjchair.diagnosis.rules import Verdict
+
+TOP = 3  # drivers of a missing force that are worth a word
+
+
+def notes_on(
+    base: Base,
+    gap: Gap,
+    choice: Choice | None,
+    stands: rules.Standing | None,
+    *,
+    said: Verdict,
+    left: list[MissingForce],
+    alone: InOneRun | None,
+) -> list[str]:
+    """All notes but those of single answers.
+
+    Args:
+      said: the verdict. left: what the missing force goes with, strongest first.
+      alone: what explains more in one run alone.
+    """
+    study = base.bench.simulator.study
+    notes = list(study.notes)
+    if study.unplaced:
+        notes.append(
+            f"where {', '.join(study.unplaced)} starts is neither measured nor given; no place on "
+            "the floor is looked for, such as a surface_patch ([trial.initial] gives a position)"
+        )
+    for channel, noise in base.bench.noise.items():
+        if noise.source != "study.toml" and channel not in study.copied:
+            notes.append(f"noise of {channel}: {noise.total:.3g} (SI), from {noise.source}")
+    notes += base.dropped
+    notes += choice.dropped if choice else []
+    notes += [
+        f"{name} stands at {bounded.WALL:g} standard deviations from what the study says of it: "
+        "something is missing there, or the study is wrong about it"
+        for name in (bounded.at_walls(choice.fitted.variant.offsets) if choice else [])
+    ]
+    if choice is not None and said in (Verdict.NAMED, Verdict.AMBIGUOUS):
+        terms = choice.fitted.variant.terms
+        said_of = [(term.effect.name, remark(choice.fitted, term)) for term in terms]
+        notes += [f"{name}: {line}" for name, line in said_of if line]
+    if said != Verdict.UNKNOWN:
+        return notes
+    if alone is not None:
+        return [*notes, of_one_run(alone, choice)]
+    if choice is not None and stands is not None:
+        notes.append(no_answer(choice, stands))
+    once = event.largest(base)
+    most = max((t.statistic for t in gap.tests), default=0.0)
+    if rules.happened_once(event=once.gain, gain=most):
+        notes.append(of_event(once, min(once.gain / most, 1.0)))
+    elif any(force.goes_with.quantity == Quantity.STROKE for force in left[:TOP]):
+        notes.append(
+            "the missing force comes back with every stroke: chair and rider are not one rigid "
+            "body, and what of the rider moves, and how heavy it is, these channels do not tell"
+        )
+    return notes
+
+
+def no_answer(choice: Choice, stands: rules.Standing) -> str:
+    """A note on the nearest effects, which are no answer."""
+    names = " and ".join(t.effect.key for t in choice.fitted.variant.terms)
+    nearest = (
+        f"nothing in the library explains the gap; the nearest, {names}, closes "
+        f"{stands.closure:.0%} of it on the runs that it was fitted to"
+    )
+    held = stands.held_out
+    if held is None or not rules.opens_a_gap(held):
+        return nearest
+    before, after = (math.sqrt(chi2 / held.dof) for chi2 in (held.before, held.after))
+    return (
+        f"{nearest}, but the held-out runs contradict it: their slow residual is {before:.2f} of "
+        f"the noise without it and {after:.2f} with it"
+    )
+
+
+def of_one_run(alone: InOneRun, choice: Choice | None) -> str:
+    """A note on what explains more in one run alone than the choice does in all."""
+    names = " or ".join(h.label for h in alone.options)
+    said = (
+        f"{alone.trial} differs from the other runs: {names} in it alone lowers chi2 by "
+        f"{alone.gain:.0f} with {_numbers(alone.options[0].free)}"
+    )
+    if choice is None:
+        return said
+    others = f"{alone.others:.0f} with {_numbers(choice.hypothesis.free)}"
+    return f"{said}, {choice.hypothesis.label} in all runs by {others}"
+
+
+def _numbers(count: int) -> str:
+    """How many numbers are free, in words."""
+    return "1 number" if count == 1 else f"{count} numbers"
+
+
+def of_event(once: event.Event, share: float) -> str:
+    """A note on an event that alone brings this share of what any test shows."""
+    of_all = f"{share:.0%} of what any test shows"
+    if once.whole:
+        return f"it may be pushes that nobody measured: forces in {once.trial} alone bring {of_all}"
+    return (
+        f"it may have happened once: a force in {once.trial} between {once.begin} and {once.end} s "
+        f"alone brings {of_all}; if something touched the chair then, cut the trial there"
+    )
+
+
+def of_uneven(one: Uneven) -> str:
+    """That an effect is not of one size."""
+    least, most = (
+        f"{size.value:.3g} ± {size.std:.1g} in {size.run}" for size in (one.least, one.most)
+    )
+    return (
+        f"{one.effect} is not of one size in these runs: its {one.parameter} is {most} and "
+        f"{least}; it may act in some of them only, as a brake that rubs or another floor does"
+    )
+
+
+def remark(fitted: Fitted, term: Term) -> str:
+    """What the values of an effect say in a sentence; empty where they say it themselves."""
+    if term.effect.remark is None:
+        return ""
+    std = {p.name: fitted.std.get(key, 0.0) for key, p in term.parameters}
+    return term.effect.remark(term.values, std)

@@ -1,0 +1,132 @@
+"""Effects that act in one run alone, on linear problems whose sizes are known."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mjchair.diagnosis import decide, notes, rules
+from mjchair.diagnosis.explain import one_run
+from mjchair.diagnosis.explain.candidates import Start
+from mjchair.diagnosis.explain.column_ids import EffectColumn, EffectGroup
+from mjchair.diagnosis.explain.hypotheses import weigh
+from mjchair.diagnosis.explain.probability import ONE_RUN, with_one_run
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.column_ids import RoughlyKnown
+from mjchair.diagnosis.fit.system import System
+from mjchair.effects.effect import Effect, Parameter
+
+RUNS, WINDOWS, ROWS = ("east", "west", "slalom"), 4, 80
+STEP = 2.0  # N, of which a column is the answer
+
+
+def start(name):
+    """An effect of one force (N), and how a fit of it begins."""
+    group = EffectGroup(name, 0)
+    return Start(
+        effect=Effect(
+            name=name,
+            parameters=(Parameter("force", "N", STEP, -90.0, 90.0),),
+            signature="",
+            source="",
+            edit=lambda spec, force: None,
+        ),
+        group=group,
+        columns=(EffectColumn(group, 0),),
+        combine=lambda coefficients: {"force": STEP * float(coefficients[0])},
+        free=("force",),
+    )
+
+
+def problem(forces, shows=(1.0, 1.0, 1.0), runs=RUNS):
+    """A base, and the choice of a drag of one size in all runs.
+
+    Args:
+      forces: N, drag in each run. shows: share of the drag that each run shows.
+    """
+    rng = np.random.default_rng(4)
+    run = np.repeat(np.arange(len(runs)), WINDOWS)
+    G, b, c = np.zeros((run.size, 3, 3)), np.zeros((run.size, 3)), np.zeros(run.size)
+    for i, k in enumerate(run):
+        J = rng.standard_normal((ROWS, 3))  # of a mass, a drag and a wind
+        J[:, 1] *= shows[k]
+        r = 0.3 * J[:, 0] + forces[k] / STEP * J[:, 1] + rng.standard_normal(ROWS)
+        G[i], b[i], c[i] = J.T @ J, J.T @ r, r @ r
+    starts = [start("drag"), start("wind")]
+    system = System(
+        columns=[RoughlyKnown("mass"), *(column for s in starts for column in s.columns)],
+        nuisance=1,
+        G=G,
+        b=b,
+        c=c,
+        run=run,
+        back=np.zeros(1),
+    )
+    windows = np.arange(run.size)
+    reduced = bounded.reduce(system, windows)
+    study = SimpleNamespace(runs=[SimpleNamespace(trial=SimpleNamespace(name=n)) for n in runs])
+    base = SimpleNamespace(
+        bench=SimpleNamespace(windows=windows, simulator=SimpleNamespace(study=study)),
+        plain=SimpleNamespace(total=reduced.total),
+        starts=starts,
+        system=system,
+        reduced=reduced,
+    )
+    drag = weigh(reduced, starts[:1])
+    fitted = SimpleNamespace(total=reduced.total - drag.gain)
+    return base, SimpleNamespace(hypothesis=drag, fitted=fitted)
+
+
+def test_a_brake_that_rubs_in_one_run_is_found_with_its_size():
+    found = one_run.in_one_run(*problem((0.0, 1.5, 0.0)))
+    assert found.trial == "west" and [h.name for h in found.options] == ["drag"]
+    term, errors = found.term(found.options[0])
+    assert errors["force"] == pytest.approx(STEP / np.sqrt(WINDOWS * ROWS), rel=0.1)
+    assert abs(term.values["force"] - 1.5) < 4.0 * errors["force"]
+    assert found.gain > 2.0 * found.others
+
+
+def test_it_is_found_where_no_effect_explains_all_runs():
+    base, _ = problem((1.5, 0.0, 0.0))
+    found = one_run.in_one_run(base, None)
+    assert found.trial == "east" and found.others == 0.0
+
+
+@pytest.mark.parametrize("shows", [(1.0, 1.0, 1.0), (0.0, 1.0, 0.02)])
+def test_what_acts_in_all_runs_is_not_of_one_run_though_one_alone_shows_it(shows):
+    assert one_run.in_one_run(*problem((1.5, 1.5, 1.5), shows)) is None
+
+
+def test_one_run_has_no_others_to_differ_from():
+    assert one_run.in_one_run(*problem((1.5,), (1.0,), ("east",))) is None
+
+
+def test_little_more_is_no_finding_nor_what_linear_algebra_may_be_wrong_by():
+    assert rules.is_of_one_run(by=16.0, gain=100.0)
+    assert not rules.is_of_one_run(by=14.0, gain=100.0)
+    assert not rules.is_of_one_run(by=90.0, gain=1000.0)
+
+
+def test_nothing_is_an_answer_beside_what_explains_more_in_one_run():
+    stands = {"closure": 1.0, "gap_left": False, "gain_by_run": 99.0, "gain_by_manoeuvre": 9.0}
+    for one, said in ((False, rules.Verdict.NAMED), (True, rules.Verdict.UNKNOWN)):
+        choice = rules.Standing(**stands, sigmas=(9.0,), at_bound=False, one_run=one)
+        assert rules.verdict(gap=True, choice=choice) == said
+
+
+def test_what_explains_more_in_one_run_is_as_much_more_probable():
+    known = with_one_run({"drag": 0.8, "wind": 0.2}, by=2.0 * np.log(50.0))
+    assert known == pytest.approx({ONE_RUN: 0.98, "drag": 0.016, "wind": 0.004})
+
+
+def test_the_report_says_which_run_differs_and_by_what():
+    base, choice = problem((0.0, 1.5, 0.0))
+    found = one_run.in_one_run(base, choice)
+    answer = decide._in_one_run(found, SimpleNamespace(excess=1.0))
+    assert answer.trial == "west"
+    assert answer.effects[0].parameters["force"].unit == "N"
+    assert answer.effects[0].closure == 1.0
+    assert notes.of_one_run(found, choice).startswith(
+        f"west differs from the other runs: drag in it alone lowers chi2 by {found.gain:.0f} with "
+        f"1 number, drag in all runs by {found.others:.0f}"
+    )
