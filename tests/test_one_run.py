@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mjchair.diagnosis import decide, notes, rules
-from mjchair.diagnosis.explain import one_run
+from mjchair.diagnosis.explain import event, one_run
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.column_ids import EffectColumn, EffectGroup
 from mjchair.diagnosis.explain.hypotheses import weigh
@@ -77,8 +77,21 @@ def problem(forces, shows=(1.0, 1.0, 1.0), runs=RUNS):
     return base, SimpleNamespace(hypothesis=drag, fitted=fitted)
 
 
+@pytest.fixture(autouse=True)
+def pushes(monkeypatch):
+    """What an event brings, in chi2."""
+    brings = [0.0]
+    monkeypatch.setattr(event, "largest", lambda base: event.Event(gain=brings[0]))
+    return brings
+
+
+def found_in(base, choice, excess=1e9):
+    """What acts in one run alone, where the gap has this chi2."""
+    return one_run.in_one_run(base, SimpleNamespace(excess=excess), choice)
+
+
 def test_a_brake_that_rubs_in_one_run_is_found_with_its_size():
-    found = one_run.in_one_run(*problem((0.0, 1.5, 0.0)))
+    found = found_in(*problem((0.0, 1.5, 0.0)))
     assert found.trial == "west" and [h.name for h in found.options] == ["drag"]
     term, errors = found.term(found.options[0])
     assert errors["force"] == pytest.approx(STEP / np.sqrt(WINDOWS * ROWS), rel=0.1)
@@ -88,23 +101,42 @@ def test_a_brake_that_rubs_in_one_run_is_found_with_its_size():
 
 def test_it_is_found_where_no_effect_explains_all_runs():
     base, _ = problem((1.5, 0.0, 0.0))
-    found = one_run.in_one_run(base, None)
+    found = found_in(base, None)
     assert found.trial == "east" and found.others == 0.0
 
 
 @pytest.mark.parametrize("shows", [(1.0, 1.0, 1.0), (0.0, 1.0, 0.02)])
 def test_what_acts_in_all_runs_is_not_of_one_run_though_one_alone_shows_it(shows):
-    assert one_run.in_one_run(*problem((1.5, 1.5, 1.5), shows)) is None
+    assert found_in(*problem((1.5, 1.5, 1.5), shows)) is None
 
 
 def test_one_run_has_no_others_to_differ_from():
-    assert one_run.in_one_run(*problem((1.5,), (1.0,), ("east",))) is None
+    assert found_in(*problem((1.5,), (1.0,), ("east",))) is None
 
 
 def test_little_more_is_no_finding_nor_what_linear_algebra_may_be_wrong_by():
     assert rules.is_of_one_run(by=16.0, gain=100.0)
     assert not rules.is_of_one_run(by=14.0, gain=100.0)
     assert not rules.is_of_one_run(by=90.0, gain=1000.0)
+
+
+def test_in_the_place_of_what_is_no_answer_it_need_only_fit_better_and_close_the_gap():
+    assert rules.may_be_of_one_run(by=4.0, gain=860.0, excess=910.0)
+    assert not rules.may_be_of_one_run(by=-1.0, gain=860.0, excess=910.0)
+    assert not rules.may_be_of_one_run(by=4.0, gain=600.0, excess=910.0)
+    base, drag = problem((0.6, 1.5, 0.7))
+    assert found_in(base, drag) is None
+    near = SimpleNamespace(hypothesis=drag.hypothesis, fitted=SimpleNamespace(total=0.0))
+    (west,) = (r for r in one_run._runs(base) if r[0] == "west")
+    near.fitted.total = base.reduced.total - west[2][0].gain + 4.0
+    found = found_in(base, near, excess=1.0)
+    assert found.trial == "west" and not found.sure
+
+
+def test_what_happens_in_two_seconds_does_not_act_all_along(pushes):
+    base, choice = problem((0.0, 1.5, 0.0))
+    pushes[0] = found_in(base, choice).gain + 1.0
+    assert found_in(base, choice) is None
 
 
 def test_nothing_is_an_answer_beside_what_explains_more_in_one_run():
@@ -121,7 +153,7 @@ def test_what_explains_more_in_one_run_is_as_much_more_probable():
 
 def test_the_report_says_which_run_differs_and_by_what():
     base, choice = problem((0.0, 1.5, 0.0))
-    found = one_run.in_one_run(base, choice)
+    found = found_in(base, choice)
     answer = decide._in_one_run(found, SimpleNamespace(excess=1.0))
     assert answer.trial == "west"
     assert answer.effects[0].parameters["force"].unit == "N"

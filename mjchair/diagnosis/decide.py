@@ -80,9 +80,9 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     choice = with_probable(choice, probability) if choice else None
     differing = uneven(base.bench, choice.fitted, choice.brought) if choice else []
     stands = standing(base, choice, closed, probability) if choice else None
-    alone = in_one_run(base, choice) if gap.exists else None
+    alone = in_one_run(base, gap, choice) if gap.exists else None
     if stands:
-        stands = replace(stands, uneven=bool(differing), one_run=alone is not None)
+        stands = replace(stands, uneven=bool(differing), one_run=bool(alone and alone.sure))
     said = rules.verdict(gap.exists, stands)
     forces = missing_forces(base)
     size = material(base, gap, choice)

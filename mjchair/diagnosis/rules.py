@@ -294,6 +294,15 @@ def is_of_one_run(*, by: float, gain: float) -> bool:
     return by > max(WORTH, LINEAR * gain)
 
 
+def may_be_of_one_run(*, by: float, gain: float, excess: float) -> bool:
+    """Whether an effect in one run alone stands in the place of effects that are no answer.
+
+    Args:
+      by, gain: as `is_of_one_run` takes them. excess: chi2 of the gap, or what other effects bring.
+    """
+    return by > 0.0 and gain >= CLOSES * excess
+
+
 def more_missing(choice: Standing) -> bool:
     """Whether an answer leaves something that is no noise."""
     held = choice.held_out

@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import hypotheses
+from mjchair.diagnosis.explain import event, hypotheses
 from mjchair.diagnosis.explain.choice import Choice
+from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit import bounded
@@ -33,6 +34,7 @@ class InOneRun:
       options: one effect each, best first; these runs do not tell them apart.
       gain: chi2 that the best brings. others: that the choice brings in all runs.
       by: chi2 by which the best is better, both less what their parameters must bring.
+      sure: whether no choice stands against it; else only one that is no answer gives way to it.
     """
 
     trial: str
@@ -41,6 +43,7 @@ class InOneRun:
     gain: float
     others: float
     by: float
+    sure: bool
 
     def term(self, option: Hypothesis) -> tuple[Term, dict[str, float]]:
         """One of the effects, and standard errors of its sizes where linear algebra tells them."""
@@ -54,8 +57,11 @@ class InOneRun:
         return term, dict(zip(start.free, (errors * sizes).tolist(), strict=True))
 
 
-def in_one_run(base: Base, choice: Choice | None) -> InOneRun | None:
-    """Effects that explain more in one run alone; None: nothing does, or there is one run."""
+def in_one_run(base: Base, gap: Gap, choice: Choice | None) -> InOneRun | None:
+    """Effects that explain more in one run alone than all else; None: nothing does.
+
+    What happened once, in two seconds of a run, is no effect that acts throughout it.
+    """
     fitted = choice.fitted if choice else base.plain
     price = fitted.total + (choice.hypothesis.penalty if choice else 0.0)
     found = max(_runs(base), key=lambda run: run[2][0].score, default=None)
@@ -64,16 +70,21 @@ def in_one_run(base: Base, choice: Choice | None) -> InOneRun | None:
     trial, reduced, options = found
     best = options[0]
     by = price - (base.reduced.total - best.score)
-    if not rules.is_of_one_run(by=by, gain=best.gain):
+    brings, others = base.plain.total - base.reduced.total + best.gain, gain(base, fitted)
+    sure = rules.is_of_one_run(by=by, gain=best.gain)
+    if event.largest(base).gain > brings:
+        return None
+    if not sure and not rules.may_be_of_one_run(by=by, gain=brings, excess=max(gap.excess, others)):
         return None
     alike = [h for h in options if best.gain - h.gain < rules.not_ruled_out(gain=best.gain)]
     return InOneRun(
         trial=trial,
         reduced=reduced,
         options=alike,
-        gain=base.plain.total - base.reduced.total + best.gain,
-        others=gain(base, fitted),
+        gain=brings,
+        others=others,
         by=by,
+        sure=sure,
     )
 
 
