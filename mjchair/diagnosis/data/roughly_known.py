@@ -32,6 +32,7 @@ class Nuisance:
       channel, error: of a sensor, and what it does.
       linear: whether its answer is added to predictions, and no chair is made with it. No time step
         simulates the tires that do not give way at all, which a chair nearly may have.
+      sides: whether more and less of it have columns of their own.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Nuisance:
     channel: str = ""
     error: SensorError = SensorError.BIAS
     linear: bool = False
+    sides: bool = False
 
 
 def _mass(spec: mujoco.MjSpec, value: float) -> None:
@@ -120,7 +122,7 @@ MECHANICAL = (
     Nuisance("centre_z", 0.03, "m", _centre(2)),
     Nuisance("rear_stiffness", 0.07, "1", _stiffness(parts.REAR)),
     Nuisance("caster_stiffness", 0.07, "1", _stiffness(parts.CASTERS)),
-    Nuisance("rocking", COMPLIANCE, "1", _rocking, linear=True),
+    Nuisance("rocking", COMPLIANCE, "1", _rocking, linear=True, sides=True),
     Nuisance("slip", COMPLIANCE, "1", _slip, linear=True),
     Nuisance("rolling_radius", 0.0015, "m", _rolling_radius),
 )

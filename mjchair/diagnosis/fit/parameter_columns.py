@@ -19,6 +19,7 @@ from mjchair.diagnosis.replay import derivatives
 from mjchair.diagnosis.replay.derivatives import Column, Point
 from mjchair.diagnosis.replay.window_states import Track
 
+STIFF, SOFT = -0.8, 0.67  # of a compliance, by which columns to its two sides are taken
 PART = 0.5  # standard deviations of a nuisance by which its derivative is taken
 FINER = 1.5  # difference of two step sizes to that of this step to none, with a margin
 
@@ -28,7 +29,7 @@ def nuisance_columns(bench: Bench, track: Track, variant: Variant) -> dict[Colum
     simulator = bench.simulator
     mechanical = [n for n in bench.nuisances if n.edit is not None]
     points = [
-        *(Point(_beside(variant, n).edit, 1.0 / _part(n), whole=True) for n in mechanical),
+        *(_point(variant, n, _part(n)) for n in mechanical),
         Point(derivatives.half_step, FINER, fine=True),
         Point(derivatives.other_integrator, FINER, fine=True),
     ]
@@ -38,6 +39,9 @@ def nuisance_columns(bench: Bench, track: Track, variant: Variant) -> dict[Colum
     out: dict[ColumnId, Column] = {
         RoughlyKnown(name): column for name, column in zip(names, columns, strict=True)
     }
+    for n in mechanical:
+        if n.sides:
+            out |= _sides(bench, track, variant, n)
     late = simulator.input_step() / np.sqrt(12.0)
     if late > 0.0 and track.coarse is not None:
         # a torque that changes between two samples changes anywhere between them
@@ -54,6 +58,36 @@ def nuisance_columns(bench: Bench, track: Track, variant: Variant) -> dict[Colum
     return out
 
 
+def _sides(
+    bench: Bench, track: Track, variant: Variant, nuisance: Nuisance
+) -> dict[ColumnId, Column]:
+    """Columns of a compliance to its two sides, as far as both simulate; the first bears its name.
+
+    A chair on stiff tires rocks not only less than one on soft tires but sooner: no one straight
+    line goes from tires that do not give way to those that give way twice as much. Where the chair
+    does not simulate with such tires, the column that is there already is kept.
+    """
+    points = [_point(variant, nuisance, side / nuisance.std) for side in (STIFF, SOFT)]
+    errors = variant.sensor_errors(bench.simulator.channels)
+    columns = derivatives.differences(bench.simulator, track, points, variant.edit, errors)
+    names = (nuisance.name, softer(nuisance))
+    return {
+        RoughlyKnown(name): column
+        for name, column in zip(names, columns, strict=True)
+        if all(np.isfinite(window).all() for window in column)
+    }
+
+
+def softer(nuisance: Nuisance) -> str:
+    """Name of the column of more compliance, where more and less have columns of their own."""
+    return f"{nuisance.name}_softer"
+
+
+def _point(variant: Variant, nuisance: Nuisance, part: float) -> Point:
+    """The variant with a part more of a nuisance, for a column of one standard deviation."""
+    return Point(_beside(variant, nuisance, part).edit, 1.0 / part, whole=True)
+
+
 def _part(nuisance: Nuisance) -> float:
     """Standard deviations of a nuisance by which its derivative is taken.
 
@@ -62,12 +96,12 @@ def _part(nuisance: Nuisance) -> float:
     return -COMPLIANCE / nuisance.std if nuisance.linear else PART
 
 
-def _beside(variant: Variant, nuisance: Nuisance) -> Variant:
+def _beside(variant: Variant, nuisance: Nuisance, part: float) -> Variant:
     """The variant with a part more of a nuisance, which is in the chair before its effects are.
 
     A chair 2 kg heavier is one whose frame is: of a person who moves on it nothing was added.
     """
-    there = variant.offsets.get(nuisance.name, 0.0) + _part(nuisance)
+    there = variant.offsets.get(nuisance.name, 0.0) + part
     return replace(variant, offsets={**variant.offsets, nuisance.name: there})
 
 
