@@ -127,8 +127,8 @@ def test_in_the_place_of_what_is_no_answer_it_need_only_fit_better_and_close_the
     base, drag = problem((0.6, 1.5, 0.7))
     assert found_in(base, drag) is None
     near = SimpleNamespace(hypothesis=drag.hypothesis, fitted=SimpleNamespace(total=0.0))
-    (west,) = (r for r in one_run._runs(base) if r[0] == "west")
-    near.fitted.total = base.reduced.total - west[2][0].gain + 4.0
+    west = dict((r, (p, o)) for r, p, o in one_run._runs(base))[1]
+    near.fitted.total = base.reduced.total - west[1][0].gain + 4.0
     found = found_in(base, near, excess=1.0)
     assert found.trial == "west" and not found.sure
 
@@ -139,6 +139,24 @@ def test_what_happens_in_two_seconds_does_not_act_all_along(pushes):
     assert found_in(base, choice) is None
 
 
+def test_with_fewer_numbers_one_run_is_a_rival_and_nothing_is_named():
+    assert rules.fits_alike_in_one_run(by=-1.0, fewer=True)
+    assert not rules.fits_alike_in_one_run(by=-9.0, fewer=True)
+    assert not rules.fits_alike_in_one_run(by=0.0, fewer=False)
+    stands = {"closure": 1.0, "gap_left": False, "gain_by_run": 99.0, "gain_by_manoeuvre": 9.0}
+    choice = rules.Standing(**stands, sigmas=(9.0,), at_bound=False, one_alike=True)
+    assert rules.verdict(gap=True, choice=choice) == rules.Verdict.AMBIGUOUS
+
+
+@pytest.mark.parametrize(("force", "one_run"), [(8.0, True), (8.0, False), (0.3, True)])
+def test_what_explains_a_gap_in_one_run_matters_by_its_own_force(force, one_run):
+    """A force of 8 N all along one run of four lies within the scatter of the whole residual."""
+    small = {"limit": 1.4, "gap": 1.1, "excess": 0.5, "p": 1e-8, "sigmas": 0.0, "told": False}
+    unknown = {"said": rules.Verdict.UNKNOWN, "probability": 0.3}
+    matters = rules.matters(force=force, one_run=one_run, **small, **unknown)
+    assert matters == (force > 1.4 and one_run)
+
+
 def test_nothing_is_an_answer_beside_what_explains_more_in_one_run():
     stands = {"closure": 1.0, "gap_left": False, "gain_by_run": 99.0, "gain_by_manoeuvre": 9.0}
     for one, said in ((False, rules.Verdict.NAMED), (True, rules.Verdict.UNKNOWN)):
@@ -147,8 +165,10 @@ def test_nothing_is_an_answer_beside_what_explains_more_in_one_run():
 
 
 def test_what_explains_more_in_one_run_is_as_much_more_probable():
-    known = with_one_run({"drag": 0.8, "wind": 0.2}, by=2.0 * np.log(50.0))
+    known = with_one_run({"drag": 0.8, "wind": 0.2}, by=2.0 * np.log(49.0 * 20.0))
     assert known == pytest.approx({ONE_RUN: 0.98, "drag": 0.016, "wind": 0.004})
+    assert list(known) == [ONE_RUN, "drag", "wind"]
+    assert with_one_run({"drag": 1.0}, by=1e6)[ONE_RUN] == 1.0
 
 
 def test_the_report_says_which_run_differs_and_by_what():

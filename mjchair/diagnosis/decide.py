@@ -33,6 +33,7 @@ from mjchair.diagnosis.explain.left_out import (
 )
 from mjchair.diagnosis.explain.one_run import InOneRun, in_one_run
 from mjchair.diagnosis.explain.probability import (
+    ONE_RUN,
     of_any,
     of_effects,
     probabilities,
@@ -81,11 +82,17 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     differing = uneven(base.bench, choice.fitted, choice.brought) if choice else []
     stands = standing(base, choice, closed, probability) if choice else None
     alone = in_one_run(base, gap, choice) if gap.exists else None
+    sure_alone = alone if alone and alone.sure else None
     if stands:
-        stands = replace(stands, uneven=bool(differing), one_run=bool(alone and alone.sure))
+        stands = replace(
+            stands,
+            uneven=bool(differing),
+            one_run=sure_alone is not None,
+            one_alike=bool(alone and alone.alike),
+        )
     said = rules.verdict(gap.exists, stands)
     forces = missing_forces(base)
-    size = material(base, gap, choice)
+    size = material(base, gap, choice, sure_alone)
     if not rules.matters(
         force=size.value,
         limit=size.limit,
@@ -98,18 +105,20 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         probability=of_any(probability, _standing_keys(choice)) if choice else 0.0,
         nothing=max(probability, key=probability.__getitem__) == NONE,
         freed=bool(choice and _walls(base.plain) and not _walls(choice.fitted)),
+        one_run=sure_alone is not None,
     ):
         said = Verdict.NONE
     if (said == Verdict.UNKNOWN and choice is None) or rules.surely(gap.p):
         probability = with_gap(probability, gap.p)
-    alone = alone if said == Verdict.UNKNOWN else None
+    if said == Verdict.NONE or (said == Verdict.AMBIGUOUS and not (alone and alone.alike)):
+        alone = None
     if alone is not None:
         probability = with_one_run(probability, alone.by)
     named = choice if said in (Verdict.NAMED, Verdict.AMBIGUOUS) else None
     left = missing(choice.after if choice else gap)
     undecided = named if said == Verdict.AMBIGUOUS else None
     once = bool(stands and stands.once)
-    sets = _alternatives(undecided, once) if undecided else []
+    sets = _alternatives(undecided, once, alone) if undecided else []
     pushed = bool(stands and stands.walls and not sets)  # to be measured, and not separated
     plan, unplanned = _plan(base, undecided, once) if undecided and not pushed else (None, [])
     return Diagnosis(
@@ -279,6 +288,8 @@ def _following(
     alone: InOneRun | None,
 ) -> str:
     """The next experiment in words; empty where none is needed."""
+    if said == Verdict.AMBIGUOUS and alone is not None:
+        return wording.repeating(alone.trial)
     if plan is not None:
         return wording.deciding(plan, base.bench.simulator)
     if said == Verdict.UNKNOWN and alone is not None:
@@ -296,13 +307,14 @@ def _following(
     return wording.measuring([(n, by) for n, by in known if rules.is_far(by)])
 
 
-def _alternatives(choice: Choice, once: bool) -> list[list[str]]:
+def _alternatives(choice: Choice, once: bool, alone: InOneRun | None) -> list[list[str]]:
     """For every effect, the names that could stand in its place, itself first.
 
     Effects that only go together, on either side, are one name.
 
     Args:
       once: whether something that happened once fits about as well.
+      alone: what fits about as well in one run alone.
     """
     sets: dict[str, list[str]] = {}
     for without, instead, _ in exchanged(choice):
@@ -313,6 +325,8 @@ def _alternatives(choice: Choice, once: bool) -> list[list[str]]:
     out = list(sets.values())
     if once:
         out.append([*(s.effect.name for s in choice.hypothesis.starts), EVENT])
+    if alone is not None:
+        out.append([_joined(choice.hypothesis.starts), ONE_RUN])
     return out
 
 

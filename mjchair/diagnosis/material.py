@@ -17,6 +17,7 @@ from mjchair.diagnosis.data.study import Study
 from mjchair.diagnosis.explain import missing_force
 from mjchair.diagnosis.explain.choice import Choice
 from mjchair.diagnosis.explain.gap import Gap, forces_left, groups
+from mjchair.diagnosis.explain.one_run import InOneRun
 from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.fit.column_ids import ColumnId
 from mjchair.diagnosis.replay.pulses import Force
@@ -28,14 +29,19 @@ NEARLY_ALL = 95.0  # percent of the time that the force is smaller
 BY_FORCE = 0.5  # share of a change that forces make: with less it is of a sensor, or of geometry
 
 
-def material(base: Base, gap: Gap, choice: Choice | None) -> Material:
+def material(base: Base, gap: Gap, choice: Choice | None, alone: InOneRun | None) -> Material:
     """The largest missing force of a study, and its limit.
 
     The force is the one that does what the best explanation does: the chosen effects, or without
     any the force that the tests see best. Of an effect that makes a wheel slide or shimmy no column
     tells how large that is, so it counts as larger than any limit.
+
+    Args:
+      alone: what acts in one run alone, where that explains the gap; None: nothing does.
     """
     study = base.bench.simulator.study
+    if alone is not None:
+        return Material(_force(base, alone.change(base)), limit(study))
     if choice is not None and _is_of_whole_size(choice):
         return Material(float("inf"), limit(study))
     return Material(largest(base, _explaining(base, gap, choice)), limit(study))
@@ -61,10 +67,7 @@ def _explaining(base: Base, gap: Gap, choice: Choice | None) -> list[int]:
 
 
 def largest(base: Base, which: Sequence[int]) -> float:
-    """The largest force forward, or at the wheels for a moment, that columns stand for, N.
-
-    What no force makes, such as the error of a sensor, counts as larger than any limit.
-    """
+    """The largest force forward, or at the wheels for a moment, that columns stand for, N."""
     if not which:
         return 0.0
     known: list[ColumnId] = [base.reduced.columns[k] for k in which]
@@ -73,6 +76,14 @@ def largest(base: Base, which: Sequence[int]) -> float:
         np.asarray(sum(float(s) * base.columns[c][i] for s, c in zip(sizes, known, strict=True)))
         for i in range(len(base.bench.simulator.windows))
     ]
+    return _force(base, change)
+
+
+def _force(base: Base, change: list[Array]) -> float:
+    """The largest force that makes a change (rows, channels) of each window, N.
+
+    What no force makes, such as the error of a sensor, counts as larger than any limit.
+    """
     around = base.around
     value, share = missing_force.equivalent_force(
         base.bench, around.track, around.pulses, around.answers, change

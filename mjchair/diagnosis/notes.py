@@ -61,10 +61,10 @@ def notes_on(
         terms = choice.fitted.variant.terms
         said_of = [(term.effect.name, remark(choice.fitted, term)) for term in terms]
         notes += [f"{name}: {line}" for name, line in said_of if line]
-    if said != Verdict.UNKNOWN:
-        return notes
     if alone is not None:
-        return [*notes, of_one_run(alone, choice)]
+        notes.append(of_one_run(alone, choice))
+    if said != Verdict.UNKNOWN or alone is not None:
+        return notes
     if choice is not None and stands is not None:
         notes.append(no_answer(choice, stands))
     once = event.largest(base)
@@ -97,10 +97,11 @@ def no_answer(choice: Choice, stands: rules.Standing) -> str:
 
 
 def of_one_run(alone: InOneRun, choice: Choice | None) -> str:
-    """A note on what explains more in one run alone than the choice does in all."""
+    """A note on what explains as much in one run alone as the choice does in all, or more."""
     names = " or ".join(h.label for h in alone.options)
+    differs = "may differ" if alone.alike and not alone.sure else "differs"
     said = (
-        f"{alone.trial} differs from the other runs: {names} in it alone lowers chi2 by "
+        f"{alone.trial} {differs} from the other runs: {names} in it alone lowers chi2 by "
         f"{alone.gain:.0f} with {_numbers(alone.options[0].free)}"
     )
     if choice is None:

@@ -134,7 +134,7 @@ class Standing:
       walls: how many numbers that are only roughly known stand on their walls with the effects in:
         they are where what is missing pushed them.
       uneven: whether an effect is not of one size in all runs.
-      one_run: whether another, in one run alone, explains more.
+      one_run: whether another, in one run alone, explains more. one_alike: or about as much.
     """
 
     closure: float
@@ -150,6 +150,7 @@ class Standing:
     walls: int = 0
     uneven: bool = False
     one_run: bool = False
+    one_alike: bool = False
 
 
 def gap_exists(p: float, sigmas: float, gain: float = 0.0) -> bool:
@@ -187,7 +188,8 @@ def verdict(gap: bool, choice: Standing | None) -> Verdict:
     if choice is None or not explains(choice):
         return Verdict.UNKNOWN
     # beside a number that is pushed to its wall, what pushes it may be all that is missing
-    alone = not choice.once and choice.probability >= PROBABLE and not choice.walls
+    once = choice.once or choice.one_alike
+    alone = not once and choice.probability >= PROBABLE and not choice.walls
     # in a single run nothing tells an effect from what is left beside it
     whole = not choice.gap_left or choice.runs > 1
     carried = choice.held_out is None or carries_over(choice.held_out)
@@ -294,6 +296,16 @@ def is_of_one_run(*, by: float, gain: float) -> bool:
     return by > max(WORTH, LINEAR * gain)
 
 
+def fits_alike_in_one_run(*, by: float, fewer: bool) -> bool:
+    """Whether an effect in one run alone is a rival of effects that act in all runs.
+
+    Args:
+      by: as `is_of_one_run` takes it. fewer: whether it has fewer numbers than these. With as many,
+        it is often one of them that a single run shows.
+    """
+    return fewer and by > -TIE
+
+
 def may_be_of_one_run(*, by: float, gain: float, excess: float) -> bool:
     """Whether an effect in one run alone stands in the place of effects that are no answer.
 
@@ -313,6 +325,7 @@ def more_missing(choice: Standing) -> bool:
 def matters(
     *, force: float, limit: float, gap: float, excess: float, p: float, told: bool, said: Verdict,
     sigmas: float, probability: float, nothing: bool = False, freed: bool = False,
+    one_run: bool = False,
 ) -> bool:  # fmt: skip
     """Whether a gap is one that matters.
 
@@ -324,6 +337,7 @@ def matters(
         there, does not matter, however large the force of a test that stands out.
       p: of the gap, by chance; one of SURELY shows, whatever the whole residual does.
       told: whether the person who asks gave the limit.
+      one_run: whether an effect in one run alone explains the gap, of which the force is then.
       probability: that an effect of the answer is there.
       nothing: whether that nothing is missing is more probable than any one explanation; then the
         whole residual must show as clearly as a gap does.
@@ -332,7 +346,7 @@ def matters(
       sigmas: of the least certain effect. Without a limit that was told, what is CERTAIN
         matters whatever its size, and a gap of twice the noise is one though no force goes with it.
     """
-    answered = said != Verdict.UNKNOWN and (probability >= LIKELY or freed)
+    answered = one_run or (said != Verdict.UNKNOWN and (probability >= LIKELY or freed))
     shows = LEAST if nothing else SHOWS
     unclear = excess < shows and gap < SMALL_GAP and not surely(p)
     if not answered and not told and unclear:

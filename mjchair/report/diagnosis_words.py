@@ -520,6 +520,8 @@ def bold(name: str) -> str:
 
 def together(names: str) -> str:
     """One of the alternatives as words, bold: an effect, several that go together, or nothing."""
+    if names == ONE_RUN:
+        return "something in one run alone"
     return "nothing" if names == NONE else " with ".join(map(bold, names.split("+")))
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import event, hypotheses
@@ -24,26 +25,42 @@ from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.fit.variant import Term
 from mjchair.effects.effect import step
 
+Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True, kw_only=True)
 class InOneRun:
     """Effects, each of which explains most of the gap by acting in one run alone.
 
     Attributes:
-      trial: name of the run. reduced: the linear algebra of columns that act there alone.
+      trial: name of the run. run: its index.
+      reduced: the linear algebra of columns that act there alone.
       options: one effect each, best first; these runs do not tell them apart.
       gain: chi2 that the best brings. others: that the choice brings in all runs.
       by: chi2 by which the best is better, both less what their parameters must bring.
-      sure: whether no choice stands against it; else only one that is no answer gives way to it.
+      sure: whether no choice stands against it. alike: whether it is a rival of the choice. Where
+        it is neither, only a choice that is no answer gives way to it.
     """
 
     trial: str
+    run: int
     reduced: Reduced
     options: list[Hypothesis]
     gain: float
     others: float
     by: float
     sure: bool
+    alike: bool
+
+    def change(self, base: Base) -> list[Array]:
+        """What the best effect changes, (rows, channels) of each window."""
+        which = self.options[0].columns
+        sizes = self.reduced.solve(self.reduced.index(which))
+        return [
+            sum(s * base.columns[c][i] for s, c in zip(sizes, which, strict=True))
+            * (w.run == self.run)
+            for i, w in enumerate(base.bench.simulator.windows)
+        ]
 
     def term(self, option: Hypothesis) -> tuple[Term, dict[str, float]]:
         """One of the effects, and standard errors of its sizes where linear algebra tells them."""
@@ -64,39 +81,44 @@ def in_one_run(base: Base, gap: Gap, choice: Choice | None) -> InOneRun | None:
     """
     fitted = choice.fitted if choice else base.plain
     price = fitted.total + (choice.hypothesis.penalty if choice else 0.0)
-    found = max(_runs(base), key=lambda run: run[2][0].score, default=None)
+    found = max(_runs(base), key=lambda found: found[2][0].score, default=None)
     if found is None:
         return None
-    trial, reduced, options = found
+    run, reduced, options = found
     best = options[0]
     by = price - (base.reduced.total - best.score)
     brings, others = base.plain.total - base.reduced.total + best.gain, gain(base, fitted)
     sure = rules.is_of_one_run(by=by, gain=best.gain)
     if event.largest(base).gain > brings:
         return None
-    if not sure and not rules.may_be_of_one_run(by=by, gain=brings, excess=max(gap.excess, others)):
+    fewer = choice is not None and best.free < choice.hypothesis.free
+    rival = rules.fits_alike_in_one_run(by=by, fewer=fewer)
+    excess = max(gap.excess, others)
+    if not (sure or rival or rules.may_be_of_one_run(by=by, gain=brings, excess=excess)):
         return None
     alike = [h for h in options if best.gain - h.gain < rules.not_ruled_out(gain=best.gain)]
     return InOneRun(
-        trial=trial,
+        trial=base.bench.simulator.study.runs[run].trial.name,
+        run=run,
         reduced=reduced,
         options=alike,
         gain=brings,
         others=others,
         by=by,
         sure=sure,
+        alike=rival,
     )
 
 
-def _runs(base: Base) -> Iterator[tuple[str, Reduced, list[Hypothesis]]]:
-    """Each run of the fit: name, linear algebra of columns that act there alone, and effects."""
-    windows, runs = base.bench.windows, base.bench.simulator.study.runs
+def _runs(base: Base) -> Iterator[tuple[int, Reduced, list[Hypothesis]]]:
+    """Each run of the fit: index, linear algebra of columns that act there alone, and effects."""
+    windows = base.bench.windows
     fitted = np.unique(base.system.run[windows])
     for run in fitted if len(fitted) > 1 else ():
         reduced = bounded.reduce(_alone(base.system, run), windows)
         options = hypotheses.singles(reduced, base.starts)
         if options:
-            yield runs[run].trial.name, reduced, options
+            yield int(run), reduced, options
 
 
 def _alone(system: System, run: int) -> System:

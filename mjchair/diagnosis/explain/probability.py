@@ -33,6 +33,8 @@ ONE_RUN = "one_run"  # an effect that acts in one run alone
 SIZES = 2.0  # sizes worth finding: standard deviation of a parameter before any data
 SPREAD = {Force.FORWARD: 5.0, Force.YAW: 1.5}  # N, N m: the same of a force outside the library
 # before any data (assumptions); what is left goes to one effect
+PRIOR_ONE_RUN = 0.05  # of studies in which one run differs, over those in which none does
+LARGE = 500.0  # of a logarithm of odds
 PRIOR_NONE, PRIOR_TWO, PRIOR_THREE, PRIOR_OUTSIDE = 0.3, 0.2, 0.05, 0.1
 
 
@@ -79,9 +81,10 @@ def with_one_run(probability: Mapping[str, float], by: float) -> dict[str, float
     Args:
       probability: of hypotheses. by: chi2, with penalties, by which it is better than the best.
     """
-    share = math.exp(-0.5 * by)
-    out = {name: p * share for name, p in probability.items()}
-    return {ONE_RUN: 1.0 - sum(out.values()), **out}
+    odds = math.exp(min(0.5 * by, LARGE)) * PRIOR_ONE_RUN
+    out = {name: p / (1.0 + odds) for name, p in probability.items()}
+    out[ONE_RUN] = odds / (1.0 + odds)
+    return dict(sorted(out.items(), key=lambda item: -item[1]))
 
 
 def of_effects(probability: Mapping[str, float], keys: Sequence[str]) -> float:

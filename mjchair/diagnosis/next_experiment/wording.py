@@ -206,6 +206,14 @@ def leaving_out(run: str) -> str:
     )
 
 
+def repeating(run: str) -> str:
+    """What to do where what one run shows, by its name, may be of this run or of all."""
+    return (
+        f"Repeat {run}, with its heading and its speed: something that acts in {run} alone fits as "
+        "well as what acts in all runs, and no other run tells the two apart."
+    )
+
+
 def searching(drivers: Sequence[tuple[Driver, float]], pushed: Collection[str] = ()) -> str:
     """What to do about a force that no effect explains.
 
