@@ -10,6 +10,7 @@ from mjchair.diagnosis.explain import event, one_run
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.column_ids import EffectColumn, EffectGroup
 from mjchair.diagnosis.explain.hypotheses import weigh
+from mjchair.diagnosis.explain.in_each_run import best_run
 from mjchair.diagnosis.explain.probability import ONE_RUN, with_one_run
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import RoughlyKnown
@@ -127,8 +128,8 @@ def test_in_the_place_of_what_is_no_answer_it_need_only_fit_better_and_close_the
     base, drag = problem((0.6, 1.5, 0.7))
     assert found_in(base, drag) is None
     near = SimpleNamespace(hypothesis=drag.hypothesis, fitted=SimpleNamespace(total=0.0))
-    west = dict((r, (p, o)) for r, p, o in one_run._runs(base))[1]
-    near.fitted.total = base.reduced.total - west[1][0].gain + 4.0
+    west = best_run(base.system, base.bench.windows, base.starts)
+    near.fitted.total = base.reduced.total - west.options[0].gain + 4.0
     found = found_in(base, near, excess=1.0)
     assert found.trial == "west" and not found.sure
 
@@ -146,15 +147,6 @@ def test_with_fewer_numbers_one_run_is_a_rival_and_nothing_is_named():
     stands = {"closure": 1.0, "gap_left": False, "gain_by_run": 99.0, "gain_by_manoeuvre": 9.0}
     choice = rules.Standing(**stands, sigmas=(9.0,), at_bound=False, one_alike=True)
     assert rules.verdict(gap=True, choice=choice) == rules.Verdict.AMBIGUOUS
-
-
-@pytest.mark.parametrize(("force", "one_run"), [(8.0, True), (8.0, False), (0.3, True)])
-def test_what_explains_a_gap_in_one_run_matters_by_its_own_force(force, one_run):
-    """A force of 8 N all along one run of four lies within the scatter of the whole residual."""
-    small = {"limit": 1.4, "gap": 1.1, "excess": 0.5, "p": 1e-8, "sigmas": 0.0, "told": False}
-    unknown = {"said": rules.Verdict.UNKNOWN, "probability": 0.3}
-    matters = rules.matters(force=force, one_run=one_run, **small, **unknown)
-    assert matters == (force > 1.4 and one_run)
 
 
 def test_nothing_is_an_answer_beside_what_explains_more_in_one_run():

@@ -105,7 +105,6 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         probability=of_any(probability, _standing_keys(choice)) if choice else 0.0,
         nothing=max(probability, key=probability.__getitem__) == NONE,
         freed=bool(choice and _walls(base.plain) and not _walls(choice.fitted)),
-        one_run=sure_alone is not None,
     ):
         said = Verdict.NONE
     if (said == Verdict.UNKNOWN and choice is None) or rules.surely(gap.p):

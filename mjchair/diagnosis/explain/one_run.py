@@ -7,8 +7,7 @@ out: where they only do not show an effect, it brings as much in all runs, and i
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +17,8 @@ from mjchair.diagnosis.explain import event, hypotheses
 from mjchair.diagnosis.explain.choice import Choice
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
-from mjchair.diagnosis.explain.screening import Base, gain
-from mjchair.diagnosis.fit import bounded
-from mjchair.diagnosis.fit.bounded import Reduced
-from mjchair.diagnosis.fit.system import System
+from mjchair.diagnosis.explain.in_each_run import ActingIn, best_run, columns_of
+from mjchair.diagnosis.explain.screening import Base, best_of_sizes, gain
 from mjchair.diagnosis.fit.variant import Term
 from mjchair.effects.effect import step
 
@@ -33,9 +30,8 @@ class InOneRun:
     """Effects, each of which explains most of the gap by acting in one run alone.
 
     Attributes:
-      trial: name of the run. run: its index.
-      reduced: the linear algebra of columns that act there alone.
-      options: one effect each, best first; these runs do not tell them apart.
+      trial: name of the run. acting: all effects there.
+      options: those that these runs do not tell apart, best first.
       gain: chi2 that the best brings. others: that the choice brings in all runs.
       by: chi2 by which the best is better, both less what their parameters must bring.
       sure: whether no choice stands against it. alike: whether it is a rival of the choice. Where
@@ -43,8 +39,7 @@ class InOneRun:
     """
 
     trial: str
-    run: int
-    reduced: Reduced
+    acting: ActingIn
     options: list[Hypothesis]
     gain: float
     others: float
@@ -54,24 +49,36 @@ class InOneRun:
 
     def change(self, base: Base) -> list[Array]:
         """What the best effect changes, (rows, channels) of each window."""
-        which = self.options[0].columns
-        sizes = self.reduced.solve(self.reduced.index(which))
+        columns = columns_of(self.acting, base.system.run, base.columns)
+        which = self.acting.reduced.index(self.options[0].columns)
+        sizes = self.acting.reduced.solve(which)
         return [
-            sum(s * base.columns[c][i] for s, c in zip(sizes, which, strict=True))
-            * (w.run == self.run)
-            for i, w in enumerate(base.bench.simulator.windows)
+            np.tensordot(sizes, np.array(window), axes=1)
+            for window in zip(*columns.values(), strict=True)
         ]
 
     def term(self, option: Hypothesis) -> tuple[Term, dict[str, float]]:
         """One of the effects, and standard errors of its sizes where linear algebra tells them."""
         (start,) = option.starts
-        (term,) = hypotheses.terms(self.reduced, option)
+        (term,) = hypotheses.terms(self.acting.reduced, option)
         if start.effect.seeds is not None or len(start.columns) != len(start.free):
             return term, {}
-        at = self.reduced.index(start.columns)
-        errors = np.sqrt(np.diag(np.linalg.inv(self.reduced.G[np.ix_(at, at)])))
+        at = self.acting.reduced.index(start.columns)
+        errors = np.sqrt(np.diag(np.linalg.inv(self.acting.reduced.G[np.ix_(at, at)])))
         sizes = [abs(step(start.effect.parameter(name))) for name in start.free]
         return term, dict(zip(start.free, (errors * sizes).tolist(), strict=True))
+
+
+def is_clear(base: Base, gap: Gap) -> bool:
+    """Whether an effect in one run alone explains so much more that no other need be fitted."""
+    acting = best_run(base.system, base.bench.windows, base.starts)
+    if acting is None:
+        return False
+    best = acting.options[0]
+    everywhere = best_of_sizes(base.reduced, base.starts)
+    by = best.score - max((h.score for h in everywhere), default=0.0)
+    clearly = rules.is_clearly_of_one_run(by=by, gain=best.gain, excess=gap.excess)
+    return clearly and event.largest(base).gain <= best.gain
 
 
 def in_one_run(base: Base, gap: Gap, choice: Choice | None) -> InOneRun | None:
@@ -81,11 +88,10 @@ def in_one_run(base: Base, gap: Gap, choice: Choice | None) -> InOneRun | None:
     """
     fitted = choice.fitted if choice else base.plain
     price = fitted.total + (choice.hypothesis.penalty if choice else 0.0)
-    found = max(_runs(base), key=lambda found: found[2][0].score, default=None)
-    if found is None:
+    acting = best_run(base.system, base.bench.windows, base.starts)
+    if acting is None:
         return None
-    run, reduced, options = found
-    best = options[0]
+    best = acting.options[0]
     by = price - (base.reduced.total - best.score)
     brings, others = base.plain.total - base.reduced.total + best.gain, gain(base, fitted)
     sure = rules.is_of_one_run(by=by, gain=best.gain)
@@ -96,11 +102,10 @@ def in_one_run(base: Base, gap: Gap, choice: Choice | None) -> InOneRun | None:
     excess = max(gap.excess, others)
     if not (sure or rival or rules.may_be_of_one_run(by=by, gain=brings, excess=excess)):
         return None
-    alike = [h for h in options if best.gain - h.gain < rules.not_ruled_out(gain=best.gain)]
+    alike = [h for h in acting.options if best.gain - h.gain < rules.not_ruled_out(gain=best.gain)]
     return InOneRun(
-        trial=base.bench.simulator.study.runs[run].trial.name,
-        run=run,
-        reduced=reduced,
+        trial=base.bench.simulator.study.runs[acting.run].trial.name,
+        acting=acting,
         options=alike,
         gain=brings,
         others=others,
@@ -108,24 +113,3 @@ def in_one_run(base: Base, gap: Gap, choice: Choice | None) -> InOneRun | None:
         sure=sure,
         alike=rival,
     )
-
-
-def _runs(base: Base) -> Iterator[tuple[int, Reduced, list[Hypothesis]]]:
-    """Each run of the fit: index, linear algebra of columns that act there alone, and effects."""
-    windows = base.bench.windows
-    fitted = np.unique(base.system.run[windows])
-    for run in fitted if len(fitted) > 1 else ():
-        reduced = bounded.reduce(_alone(base.system, run), windows)
-        options = hypotheses.singles(reduced, base.starts)
-        if options:
-            yield int(run), reduced, options
-
-
-def _alone(system: System, run: int) -> System:
-    """The system in which nothing but what is only roughly known acts outside one run."""
-    first, outside = system.nuisance, system.run != run
-    G, b = system.G.copy(), system.b.copy()
-    G[outside, first:, :] = 0.0
-    G[outside, :, first:] = 0.0
-    b[outside, first:] = 0.0
-    return replace(system, G=G, b=b)

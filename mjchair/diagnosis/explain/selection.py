@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import one_run
 from mjchair.diagnosis.explain.backward_elimination import without_needless
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Choice, Tried
@@ -38,7 +39,7 @@ def explained(fits: Fits) -> tuple[Base, Gap, Choice | None]:
     fits.say("the gap")
     gap = plain_gap(fits.base)
     fits.say("effects, one and two at a time")
-    choice = choose(fits) if gap.exists else None
+    choice = choose(fits) if gap.exists and not one_run.is_clear(fits.base, gap) else None
     if choice is None or max(choice.fitted.sigmas.values()) > rules.SIGMAS:
         return fits.base, gap, choice
     plain = plain_from(fits.base, choice.fitted)

@@ -1,0 +1,64 @@
+"""A whole diagnosis of four coasts, one of which rolls on another floor."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mjchair
+from mjchair.diagnosis.data.study import Run, make_study
+from mjchair.diagnosis.diagnose import diagnose
+from mjchair.diagnosis.rules import Verdict
+from mjchair.effects.library import find
+from mjchair.measurement.trial import Trial
+from mjchair.simulation.initial import Initial
+
+CARPET = 0.008  # more of the rolling resistance coefficient, in one run
+SPEEDS = {"a": 1.5, "b": 1.2, "c": 1.6, "d": 1.4}
+CHANNELS = ("left_wheel_speed", "right_wheel_speed", "imu_gyro.z")
+NOISE = {"left_wheel_speed": 0.05, "right_wheel_speed": 0.05, "imu_gyro.z": 0.01}
+
+
+@pytest.fixture(scope="module")
+def found():
+    rng, runs = np.random.default_rng(6), []
+    for name, speed in SPEEDS.items():
+        spec = mjchair.load_spec("manual")
+        if name == "b":
+            effect = find("rolling_resistance").on(spec)
+            effect.apply(spec, {**effect.neutral(), "coefficient": CARPET})
+        rolled = mjchair.simulate(
+            spec, duration=4.0, initial=Initial(speed=speed), timestep=0.001, sample_rate=100.0
+        )
+        seen = {c: rolled[c] + NOISE[c] * rng.standard_normal(rolled.time.size) for c in CHANNELS}
+        runs.append(
+            Run(
+                Trial(name, rolled.time, seen, None, {}),
+                "coast",
+                name == "d",
+                Initial(),
+                frozenset(),
+            )
+        )
+    study = make_study(mjchair.load_spec("manual"), runs, NOISE)
+    return diagnose(replace(study, indoors=True))
+
+
+def test_the_floor_of_one_run_is_no_effect_of_all_runs_and_no_noise(found):
+    assert found.verdict == Verdict.UNKNOWN and found.one_run.trial == "b"
+    assert "b differs from the other runs" in found.notes[-1]
+    assert "without b" in found.next_experiment
+    assert next(iter(found.probability)) == "one_run"
+
+
+def test_its_size_is_told_with_the_effects_that_fit_alike(found):
+    sizes = {e.name: e.parameters for e in found.one_run.effects}
+    carpet = sizes["rolling_resistance"]["coefficient"]
+    assert abs(carpet.value - CARPET) < max(3.0 * carpet.std, 0.05 * CARPET)
+    assert "floor_slope" in sizes
+    assert found.material.value == pytest.approx(CARPET * 9.81 * 90.0, rel=0.25)
+
+
+def test_no_run_alone_shakes_the_others(found):
+    """A force of 7 N in one run had all runs shaken by 2 N."""
+    assert found.process["drive"].value < 0.5
