@@ -107,6 +107,10 @@ CASES = {
         {"columns": coast(0.5) | {"left_wheel_speed": coast(0.5)["left_wheel_speed"] * 57.3}},
         "left_wheel_speed looks like degrees: it tells 57.3 times what right_wheel_speed does",
     ),
+    "a velocity in km/h beside wheels": (
+        {"columns": coast() | {"velocity.x": 3.5 * 0.3 * coast()["left_wheel_speed"]}},
+        r"velocity.x looks like km/h: it tells 3.\d+ times .* as in velocity.x \[km/h\]",
+    ),
     "the only channel in degrees": (
         {"columns": {"left_wheel_speed": coast()["left_wheel_speed"] * 57.3}},
         "left_wheel_speed looks like deg/s or rpm",

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from figure_layout import assert_legible
 
+from mjchair.diagnosis import notes
 from mjchair.diagnosis.explain.column_ids import Driver, Quantity
 from mjchair.diagnosis.explain.missing_force import Products, mean_forces
 from mjchair.diagnosis.fit.variant import Variant
@@ -192,6 +194,29 @@ def test_no_share_of_a_gap_is_shown_where_there_is_none():
     assert ">closes<" not in page(none, {}) and "|cos|" not in page(none, {})
     assert ">|cos|<" in page(diagnosis(), {})
     assert "closes" not in str(candidates.figure(none).axes[-1].get_xlabel())
+
+
+def test_it_is_said_why_what_fits_is_not_named():
+    open_sets = dataclasses.replace(diagnosis(Verdict.AMBIGUOUS), alternatives=[["toe", "wind"]])
+    assert words.choice_words(open_sets).endswith("Another of its set fits about as well.")
+    (effect, *_) = open_sets.effects
+    rare = dataclasses.replace(
+        open_sets, alternatives=[], effects=[effect], probability={effect.key: 0.21}
+    )
+    assert words.choice_words(rare).endswith("Its probability is 21%, below 95 %.")
+    left = dataclasses.replace(rare, probability={effect.key: 0.97})
+    assert "not enough to name it" in words.choice_words(left)
+
+
+def test_noise_that_is_larger_than_the_study_says_is_told():
+    of = {"a": 0.0046, "b": 0.004, "c": 0.2}
+    noise = {c: SimpleNamespace(total=v, source="study.toml") for c, v in of.items()}
+    study = SimpleNamespace(notes=[], unplaced=(), copied=(), noise={"a": 0.0005, "b": 0.0041})
+    bench = SimpleNamespace(simulator=SimpleNamespace(study=study), noise=noise)
+    base = SimpleNamespace(bench=bench, dropped=[])
+    said = notes.notes_on(base, None, None, None, said=Verdict.NONE, left=[], alone=None)
+    assert [line.split(":")[0] for line in said] == ["noise of a", "noise of c"]
+    assert "0.0046 (SI) is left by the best fit, and not the 0.0005" in said[0]
 
 
 def test_what_acts_in_one_run_alone_is_said_with_the_run_and_the_sizes():

@@ -21,6 +21,7 @@ from mjchair.diagnosis.fit.variant import Term
 from mjchair.diagnosis.result import MissingForce
 from mjchair.diagnosis.rules import Verdict
 
+NEAR = 1.5  # times the noise that was given: of what is nearer nothing is said
 TOP = 3  # drivers of a missing force that are worth a word
 
 
@@ -48,7 +49,13 @@ def notes_on(
             "the floor is looked for, such as a surface_patch ([trial.initial] gives a position)"
         )
     for channel, noise in base.bench.noise.items():
-        if noise.source != "study.toml" and channel not in study.copied:
+        given = study.noise.get(channel)
+        if given is not None and not 1.0 / NEAR < noise.total / given < NEAR:
+            notes.append(
+                f"noise of {channel}: {noise.total:.3g} (SI) is left by the best fit, and not the "
+                f"{given:.3g} that study.toml gives; {noise.total:.3g} is used"
+            )
+        elif given is None and channel not in study.copied:
             notes.append(f"noise of {channel}: {noise.total:.3g} (SI), from {noise.source}")
     notes += base.dropped
     notes += choice.dropped if choice else []

@@ -399,17 +399,17 @@ def alike_words(diagnosis: Diagnosis) -> str:
 def choice_words(diagnosis: Diagnosis) -> str:
     """Why this effect, or why none."""
     if diagnosis.verdict == Verdict.NONE:
-        return "None is named, since there is no gap to explain."
+        gap = diagnosis.gap
+        if gap is None or gap.p_value >= LEVEL:
+            return "None is named, since there is no gap to explain."
+        return "None is named, since what is left does not matter (section 1)."
     if diagnosis.verdict == Verdict.NAMED:
         return (
             f"It is significant, it holds on {other_runs(diagnosis)}, it closes most of the "
             "gap, and its probability is 95 % or more."
         )
     if diagnosis.verdict == Verdict.AMBIGUOUS:
-        return (
-            "It is one explanation that fits. Another of its set fits about as well, or its "
-            "parameter is not clearly away from nothing."
-        )
+        return _open_words(diagnosis)
     rules = (
         f"None is named. An answer closes at least {PARTLY:.0%} of the gap and holds on "
         f"{other_runs(diagnosis)}; no effect, nor two or three together, does both. "
@@ -417,6 +417,19 @@ def choice_words(diagnosis: Diagnosis) -> str:
     if diagnosis.one_run is not None:
         return f"{one_run_words(diagnosis.one_run)} Section 2 is what is known of it."
     return rules + nearest_words(diagnosis) + "Section 2 is what is known of the force."
+
+
+def _open_words(diagnosis: Diagnosis) -> str:
+    """Why an effect that fits is not named."""
+    if diagnosis.alternatives:
+        return "It is one explanation that fits. Another of its set fits about as well."
+    likely = of_effects(diagnosis.probability, [e.key for e in diagnosis.effects])
+    if likely < PROBABLE:
+        return f"It is one explanation that fits. Its probability is {likely:.0%}, below 95 %."
+    return (
+        "It is one explanation that fits. What it leaves, or how well its numbers are known, is "
+        "not enough to name it."
+    )
 
 
 def nearest_words(diagnosis: Diagnosis) -> str:

@@ -104,8 +104,8 @@ def check_time(time: Array, source: str) -> None:
     if back.size:
         row = back[0] + 1
         raise MjchairError(
-            f"{source}: time goes from {time[row - 1]:g} to {time[row]:g} s in sample {row + 1}; "
-            "it must increase strictly"
+            f"{source}: time goes from {time[row - 1]:.12g} to {time[row]:.12g} s in sample "
+            f"{row + 1}; it must increase strictly"
         )
 
 

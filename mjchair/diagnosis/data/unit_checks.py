@@ -25,6 +25,7 @@ from mjchair.simulation.table import Array
 DEGREES, GRAVITY = 180.0 / np.pi, 9.81
 TURN = 2.0 * np.pi + 0.2  # rad, within which a heading begins
 NEAR = 1.3  # factor within which two stories differ by a unit
+KMH, CLOSE = 3.6, 1.15  # km/h in a m/s; factor by which a wheel's radius may be wrong
 ALIKE = 0.95  # cosine of two stories that are one
 FORWARD, YAW, PULL = 0.05, 0.03, 0.05  # m/s, rad/s and m/s: motion below which nothing is compared
 OTHER_START = 1.0  # m/s, and the speed itself, by which a first speed is not the one that is seen
@@ -228,6 +229,8 @@ def _compare(trial: Trial, axle: RearAxle, stories: dict[str, Story], least: flo
         if DEGREES / NEAR < ratio < DEGREES * NEAR and stories[name].unit:
             why = f"it tells {ratio:.1f} times what {_article(other)} does"
             _refuse(trial, name, "degrees", why, stories[name].unit)
+        if name.startswith("velocity") and KMH / CLOSE < ratio < KMH * CLOSE:
+            _refuse(trial, name, "km/h", f"it tells {ratio:.2f} times what {other} does", "km/h")
         if other == "wheels" and 1.0 / NEAR < ratio * axle.left < NEAR and _speeds(trial):
             _refuse_rolled(trial, axle, f"the wheels tell {1.0 / ratio:.2f} times what {name} does")
 

@@ -41,6 +41,7 @@ def figure(diagnosis: Diagnosis) -> Figure | None:
     ax.set_xlim(0.0, 112.0)
     ax.set_xticks([0, 20, 40, 60, 80, 100])
     ax.set_xlabel("probability (%)")
+    ax.spines["bottom"].set_bounds(0.0, 100.0)
     for side in ("top", "right"):
         ax.spines[side].set_visible(False)
     return drawn
