@@ -594,6 +594,19 @@ def test_a_table_of_an_accelerometer_in_the_axes_of_the_chair_is_joined_and_draw
     np.testing.assert_allclose(summed.get_ydata(), speed[150:][np.arange(1350) != 200], atol=0.2)
 
 
+@pytest.mark.parametrize(("drive", "word"), [(0.0, "coast"), (6.0, "push")])
+def test_a_torque_that_is_noise_makes_a_coast_no_push(drive, word, tmp_path):
+    rng, time = np.random.default_rng(2), np.arange(0.0, 8.0, 0.01)
+    hand = drive * np.maximum(np.sin(2.0 * np.pi * time), 0.0)
+    speed = 4.0 - 0.1 * time - 0.02 * drive * np.cos(2.0 * np.pi * time)
+    torque = [hand + 0.3 * rng.normal(size=time.size) for _ in range(2)]
+    header = "time,left_wheel,right_wheel,left_wheel_speed,right_wheel_speed"
+    rows = np.column_stack([time, *torque, speed, speed])
+    np.savetxt(tmp_path / "run.csv", rows, "%.6g", ",", header=header, comments="")
+    (trial,) = gather(tmp_path).trials
+    assert trial.manoeuvre == word and trial.driven
+
+
 def test_a_code_for_missing_samples_is_no_speed(tmp_path):
     (tmp_path / "run.csv").write_text(table_of(code=-9999.0))
     gathered = gather(tmp_path)

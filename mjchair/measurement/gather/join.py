@@ -30,6 +30,7 @@ GAP = 0.2  # s, in which the chair is not seen, beyond which its speed there is 
 ENOUGH = 4.0  # s, of the chair seen without a gap, that tell a clock alone
 RESTS = 0.05  # rad/s of a wheel, below which the chair stands
 TURNS = 0.03  # rad/s rms, of a turning by which sides are checked
+HELD, IDLE = 0.2, 0.5  # s, N m: a torque that is not held so long, or smaller, pushes no chair
 RADII = 0.02  # of a wheel's radius, by which it may be off that which it was set to; assumption
 FREE = 0.1  # the same where nothing tells it
 EARLY = (0.3, 1.0)  # s: a heading at the beginning is a mean over so long, and seen within so long
@@ -93,9 +94,16 @@ def join(
         raise MjchairError(f"trial {name!r}: its files hold no channel of a chair")
     if time[-1] - time[0] < LEAST:
         raise MjchairError(f"trial {name!r} lasts {time[-1] - time[0]:.2g} s; at least {LEAST:g} s")
-    driven = bool({"left_wheel", "right_wheel"} & set(columns))
-    word = "push" if driven else "coast"
+    word = "push" if _is_pushed(time, columns) else "coast"
     return GatheredTrial(name, time, columns, word, alignments, tuple(ours), tuple(notes), begin)
+
+
+def _is_pushed(time: Array, columns: Mapping[str, Array]) -> bool:
+    """Whether a wheel has a torque that is more than the noise of its sensor, for HELD at least."""
+    span = max(1, round(HELD / float(np.median(np.diff(time)))))
+    torques = [columns[name] for name in ("left_wheel", "right_wheel") if name in columns]
+    held = [np.convolve(np.nan_to_num(t), np.ones(span) / span, "valid") for t in torques]
+    return any(np.abs(one).max(initial=0.0) > IDLE for one in held)
 
 
 def _reference(instruments: Sequence[Instrument]) -> Instrument:
