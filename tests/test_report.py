@@ -228,7 +228,8 @@ def test_what_acts_in_one_run_alone_is_said_with_the_run_and_the_sizes():
     assert said.startswith("coast_2 differs from the other runs")  # a name keeps its letters
     assert "left 0.580 ± 0.040 N m" in said and said.endswith("so nothing is named.")
     assert "coast_2" in words.choice_words(found) and "nearest" not in words.choice_words(found)
-    assert "coast_2 differs from the other runs" in page(found, {})
+    html = page(found, {})
+    assert html.count("coast_2 differs from the other runs: <b>bearing friction</b>") == 2
 
 
 def test_what_the_corrected_chair_has_besides_is_to_be_measured_first():
