@@ -149,6 +149,12 @@ def test_with_fewer_numbers_one_run_is_a_rival_and_nothing_is_named():
     assert rules.verdict(gap=True, choice=choice) == rules.Verdict.AMBIGUOUS
 
 
+@pytest.mark.parametrize("alike", [False, True])
+def test_beside_a_name_no_run_alone_is_said(alike):
+    said = [v for v in rules.Verdict if rules.says_one_run(v, alike=alike)]
+    assert said == [rules.Verdict.AMBIGUOUS] * alike + [rules.Verdict.UNKNOWN]
+
+
 def test_nothing_is_an_answer_beside_what_explains_more_in_one_run():
     stands = {"closure": 1.0, "gap_left": False, "gain_by_run": 99.0, "gain_by_manoeuvre": 9.0}
     for one, said in ((False, rules.Verdict.NAMED), (True, rules.Verdict.UNKNOWN)):

@@ -109,7 +109,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         said = Verdict.NONE
     if (said == Verdict.UNKNOWN and choice is None) or rules.surely(gap.p):
         probability = with_gap(probability, gap.p)
-    if said == Verdict.NONE or (said == Verdict.AMBIGUOUS and not (alone and alone.alike)):
+    if alone is not None and not rules.says_one_run(said, alike=alone.alike):
         alone = None
     if alone is not None:
         probability = with_one_run(probability, alone.by)

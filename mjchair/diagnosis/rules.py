@@ -319,6 +319,15 @@ def fits_alike_in_one_run(*, by: float, fewer: bool) -> bool:
     return fewer and by > -TIE
 
 
+def says_one_run(said: Verdict, *, alike: bool) -> bool:
+    """Whether a verdict says what acts in one run alone: in the place of an answer, or beside it.
+
+    Args:
+      alike: whether it is a rival of the answer.
+    """
+    return said == Verdict.UNKNOWN or (said == Verdict.AMBIGUOUS and alike)
+
+
 def may_be_of_one_run(*, by: float, gain: float, excess: float) -> bool:
     """Whether an effect in one run alone stands in the place of effects that are no answer.
 
