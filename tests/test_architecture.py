@@ -65,7 +65,7 @@ ROOMS = [
     ("explain",),
     ("next_experiment",),
     ("result",),
-    ("evidence", "material"),
+    ("evidence", "material", "notes"),
     ("decide",),
     ("diagnose",),
     ("driven_run",),

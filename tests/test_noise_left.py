@@ -21,7 +21,8 @@ def taken(monkeypatch, first, other, promised=0.0):
     """
     looked = []
     by_columns = SimpleNamespace(power=promised)
-    monkeypatch.setattr(screening, "_best_of_sizes", lambda *_: [None])
+    monkeypatch.setattr(screening, "best_of_sizes", lambda *_: [None])
+    monkeypatch.setattr(screening, "_quieter_but_for_one_run", lambda *_: None)
     monkeypatch.setattr(screening, "_left_by_columns", lambda *_: by_columns)
 
     def noise_left(base, bench, reduced, options):

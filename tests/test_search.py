@@ -308,6 +308,7 @@ def test_a_chair_without_effects_is_fitted_from_where_effects_ended_that_are_har
     helped = SimpleNamespace(fitted=fit(1100.0, "rolling"))
     helped.fitted.sigmas, helped.fitted.columns = {"rolling": sigmas}, {}
     monkeypatch.setattr(selection, "plain_gap", gap)
+    monkeypatch.setattr(selection.one_run, "is_clear", lambda *_: False)
     monkeypatch.setattr(selection, "choose", lambda _: helped)
     monkeypatch.setattr(selection, "made_anew", lambda *_: fit(from_there))
     monkeypatch.setattr(selection, "replace", put)
@@ -513,7 +514,9 @@ def test_two_effects_may_stand_in_the_place_of_one():
     ((without, instead, rival),) = rivals.exchanged(found)
     assert (without, instead) == ([ROLLING], [MOTOR, WIND])
     assert rival is found.others[0]
-    assert decide._alternatives(found, once=False) == [["rolling", "motor+wind"]]
+    assert decide._alternatives(found, once=False, alone=None) == [["rolling", "motor+wind"]]
+    alone = decide._alternatives(found, once=False, alone=SimpleNamespace())
+    assert alone[1:] == [["rolling", "one_run"]]
 
 
 @pytest.mark.parametrize("cannot_be", [False, True])
@@ -542,7 +545,7 @@ def test_one_effect_may_stand_in_the_place_of_two_and_nothing_in_that_of_one():
     wind = Hypothesis((WIND,), 490.0, 470.0)
     choice = chosen(BOTH, [(BOTH, 1e3), (wind, 1020.0), (ONE, 1030.0)], [400.0, 30.0])
     found = rivals.with_probable(choice, {BOTH.name: 0.7, "wind": 0.2, "rolling": 0.1})
-    sets = decide._alternatives(found, once=False)
+    sets = decide._alternatives(found, once=False, alone=None)
     assert sorted(sets) == [["motor", "none"], ["rolling+motor", "wind"]]
     assert found.brought == {"rolling": 400.0, "motor": 30.0}
 
