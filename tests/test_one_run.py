@@ -72,6 +72,7 @@ def problem(forces, shows=(1.0, 1.0, 1.0), runs=RUNS):
         starts=starts,
         system=system,
         reduced=reduced,
+        acting_alone=best_run(system, windows, starts),
     )
     drag = weigh(reduced, starts[:1])
     fitted = SimpleNamespace(total=reduced.total - drag.gain)
@@ -128,7 +129,7 @@ def test_in_the_place_of_what_is_no_answer_it_need_only_fit_better_and_close_the
     base, drag = problem((0.6, 1.5, 0.7))
     assert found_in(base, drag) is None
     near = SimpleNamespace(hypothesis=drag.hypothesis, fitted=SimpleNamespace(total=0.0))
-    west = best_run(base.system, base.bench.windows, base.starts)
+    west = base.acting_alone
     near.fitted.total = base.reduced.total - west.options[0].gain + 4.0
     found = found_in(base, near, excess=1.0)
     assert found.trial == "west" and not found.sure

@@ -17,9 +17,10 @@ from mjchair.diagnosis.data.study import Study
 from mjchair.diagnosis.explain import missing_force
 from mjchair.diagnosis.explain.choice import Choice
 from mjchair.diagnosis.explain.gap import Gap, forces_left, groups
+from mjchair.diagnosis.explain.in_each_run import ActingIn, columns_of
 from mjchair.diagnosis.explain.one_run import InOneRun
 from mjchair.diagnosis.explain.screening import Base
-from mjchair.diagnosis.fit.column_ids import ColumnId
+from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.result import Material
 from mjchair.model.rolling import rear_axle
@@ -41,7 +42,7 @@ def material(base: Base, gap: Gap, choice: Choice | None, alone: InOneRun | None
     """
     study = base.bench.simulator.study
     if alone is not None:
-        return Material(_force(base, alone.change(base)), limit(study))
+        return Material(_of_one_run(base, alone.acting), limit(study))
     if choice is not None and _is_of_whole_size(choice):
         return Material(float("inf"), limit(study))
     return Material(largest(base, _explaining(base, gap, choice)), limit(study))
@@ -70,13 +71,23 @@ def largest(base: Base, which: Sequence[int]) -> float:
     """The largest force forward, or at the wheels for a moment, that columns stand for, N."""
     if not which:
         return 0.0
-    known: list[ColumnId] = [base.reduced.columns[k] for k in which]
-    sizes = base.reduced.solve(list(which))
-    change = [
-        np.asarray(sum(float(s) * base.columns[c][i] for s, c in zip(sizes, known, strict=True)))
-        for i in range(len(base.bench.simulator.windows))
+    columns = [base.columns[base.reduced.columns[k]] for k in which]
+    return _force(base, _together(base.reduced.solve(list(which)), columns))
+
+
+def _of_one_run(base: Base, acting: ActingIn) -> float:
+    """The largest force of the best effect in one run, N."""
+    columns = columns_of(acting, base.system.run, base.columns)
+    which = acting.reduced.index(acting.options[0].columns)
+    return _force(base, _together(acting.reduced.solve(which), list(columns.values())))
+
+
+def _together(sizes: Array, columns: Sequence[Column]) -> list[Array]:
+    """What columns of these sizes change together, (rows, channels) of each window."""
+    return [
+        np.asarray(sum(float(s) * c for s, c in zip(sizes, window, strict=True)))
+        for window in zip(*columns, strict=True)
     ]
-    return _force(base, change)
 
 
 def _force(base: Base, change: list[Array]) -> float:

@@ -242,7 +242,7 @@ class Nearest:
 
 @dataclass(frozen=True, kw_only=True)
 class OneRun:
-    """Effects that explain more by acting in one run alone than any that act in all runs.
+    """Effects that explain more by acting in one run alone, or as much, as any in all runs do.
 
     Attributes:
       trial: name of the run. effects: any one of them, best first, by linear algebra.
@@ -348,7 +348,8 @@ class Diagnosis:
       where: where the disagreement is. next_experiment: what would decide.
       notes: what was assumed or noticed. drivers: what the force that is missing goes with.
       nearest: the explanation that comes nearest where none is named.
-      one_run: what acts in one run alone, where that explains more; the verdict is unknown then.
+      one_run: what acts in one run alone, where that explains more (the verdict is unknown then),
+        or as much (it is ambiguous).
       probability: of every hypothesis; a pair is "a+b". more_missing: whether the effects leave
         something that is no noise. material: the largest missing force, and what matters.
       process: drive, side, yaw, wheel_turn, caster_turn -> standard deviation of what shakes the

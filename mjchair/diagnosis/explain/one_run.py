@@ -10,19 +10,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import event, hypotheses
 from mjchair.diagnosis.explain.choice import Choice
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
-from mjchair.diagnosis.explain.in_each_run import ActingIn, best_run, columns_of
+from mjchair.diagnosis.explain.in_each_run import ActingIn
 from mjchair.diagnosis.explain.screening import Base, best_of_sizes, gain
 from mjchair.diagnosis.fit.variant import Term
 from mjchair.effects.effect import step
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,16 +44,6 @@ class InOneRun:
     sure: bool
     alike: bool
 
-    def change(self, base: Base) -> list[Array]:
-        """What the best effect changes, (rows, channels) of each window."""
-        columns = columns_of(self.acting, base.system.run, base.columns)
-        which = self.acting.reduced.index(self.options[0].columns)
-        sizes = self.acting.reduced.solve(which)
-        return [
-            np.tensordot(sizes, np.array(window), axes=1)
-            for window in zip(*columns.values(), strict=True)
-        ]
-
     def term(self, option: Hypothesis) -> tuple[Term, dict[str, float]]:
         """One of the effects, and standard errors of its sizes where linear algebra tells them."""
         (start,) = option.starts
@@ -71,7 +58,7 @@ class InOneRun:
 
 def is_clear(base: Base, gap: Gap) -> bool:
     """Whether an effect in one run alone explains so much more that no other need be fitted."""
-    acting = best_run(base.system, base.bench.windows, base.starts)
+    acting = base.acting_alone
     if acting is None:
         return False
     best = acting.options[0]
@@ -88,7 +75,7 @@ def in_one_run(base: Base, gap: Gap, choice: Choice | None) -> InOneRun | None:
     """
     fitted = choice.fitted if choice else base.plain
     price = fitted.total + (choice.hypothesis.penalty if choice else 0.0)
-    acting = best_run(base.system, base.bench.windows, base.starts)
+    acting = base.acting_alone
     if acting is None:
         return None
     best = acting.options[0]

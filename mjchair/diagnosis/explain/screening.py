@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from mjchair.diagnosis.explain import gap as gaps
 from mjchair.diagnosis.explain.candidates import Around, Start
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
-from mjchair.diagnosis.explain.in_each_run import best_run, columns_of
+from mjchair.diagnosis.explain.in_each_run import ActingIn, best_run, columns_of
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.bounded import Reduced
@@ -83,6 +84,11 @@ class Base:
     reduced: Reduced
     found: Found | None = None
     best: Found | None = None
+
+    @cached_property
+    def acting_alone(self) -> ActingIn | None:
+        """The run in which one effect alone brings most, by linear algebra; None: none does."""
+        return best_run(self.system, self.bench.windows, self.starts)
 
 
 def silent(_: str) -> None:
@@ -163,32 +169,31 @@ def _with_noise_left(base: Base) -> Base:
     loud = noise_shown.loudness(bench)
     if loud > LOUD:
         hushed = noise_shown.hushed(base.bench)
-        reduced = _reduced_anew(_on(base, hushed)).reduced
-        options = best_of_sizes(reduced, base.starts)
+        quiet = _reduced_anew(_on(base, hushed))
+        options = best_of_sizes(quiet.reduced, base.starts)
         if _may_be_quieter(base, options, loud):
-            quieter, other = _noise_left(base, hushed, reduced, options)
+            quieter, other = _noise_left(base, hushed, quiet.reduced, options)
             if noise_shown.loudness(quieter) < QUIETER * loud:
                 bench, best = quieter, other
-        bench = _quieter_but_for_one_run(base, hushed, noise_shown.loudness(bench)) or bench
+        bench = _quieter_but_for_one_run(base, quiet, noise_shown.loudness(bench)) or bench
     return replace(with_noise(base, bench), best=best)
 
 
-def _quieter_but_for_one_run(base: Base, hushed: Bench, loud: float) -> Bench | None:
+def _quieter_but_for_one_run(base: Base, quiet: Base, loud: float) -> Bench | None:
     """The bench with the noise that an effect in one run alone leaves; None: that is not far less.
 
     A force that stays for all of a run passes for noise as well: of four runs with a push of 8 N in
     one, all seem to be shaken by 2 N.
 
     Args:
-      hushed: the bench in which hardly anything shakes the chair. loud: how much does so far.
+      quiet: the base in which hardly anything shakes the chair. loud: how much does so far.
     """
     if loud <= LOUD:
         return None
-    system = _reduced_anew(_on(base, hushed)).system
-    acting = best_run(system, base.bench.windows, base.starts)
+    acting = quiet.acting_alone
     if acting is None or acting.score <= 0.0:
         return None
-    own = columns_of(acting, system.run, base.columns)
+    own = columns_of(acting, base.system.run, base.columns)
     bench, _ = noise_shown.left_by(base.bench, base.around.track, base.nuisances, own)
     return bench if noise_shown.loudness(bench) < QUIETER * loud else None
 

@@ -28,14 +28,15 @@ def nuisance_columns(bench: Bench, track: Track, variant: Variant) -> dict[Colum
     """Columns of all nuisances and of the differences to a finer simulation."""
     simulator = bench.simulator
     mechanical = [n for n in bench.nuisances if n.edit is not None]
+    plain = [n for n in mechanical if not n.sides]
     points = [
-        *(_point(variant, n, _part(n)) for n in mechanical),
+        *(_point(variant, n, _part(n)) for n in plain),
         Point(derivatives.half_step, FINER, fine=True),
         Point(derivatives.other_integrator, FINER, fine=True),
     ]
     errors = variant.sensor_errors(simulator.channels)
     columns = derivatives.differences(simulator, track, points, variant.edit, errors)
-    names = [*(n.name for n in mechanical), "half_step", "integrator"]
+    names = [*(n.name for n in plain), "half_step", "integrator"]
     out: dict[ColumnId, Column] = {
         RoughlyKnown(name): column for name, column in zip(names, columns, strict=True)
     }
@@ -65,17 +66,26 @@ def _sides(
 
     A chair on stiff tires rocks not only less than one on soft tires but sooner: no one straight
     line goes from tires that do not give way to those that give way twice as much. Where the chair
-    does not simulate with such tires, the column that is there already is kept.
+    does not simulate with so stiff tires, the first is of tires a little stiffer.
     """
-    points = [_point(variant, nuisance, side / nuisance.std) for side in (STIFF, SOFT)]
     errors = variant.sensor_errors(bench.simulator.channels)
-    columns = derivatives.differences(bench.simulator, track, points, variant.edit, errors)
-    names = (nuisance.name, softer(nuisance))
-    return {
-        RoughlyKnown(name): column
-        for name, column in zip(names, columns, strict=True)
-        if all(np.isfinite(window).all() for window in column)
-    }
+
+    def beside(part: float) -> Column:
+        point = _point(variant, nuisance, part)
+        return derivatives.differences(bench.simulator, track, [point], variant.edit, errors)[0]
+
+    stiff, soft = (beside(side / nuisance.std) for side in (STIFF, SOFT))
+    out: dict[ColumnId, Column] = {RoughlyKnown(nuisance.name): stiff}
+    if not _simulates(stiff):
+        out[RoughlyKnown(nuisance.name)] = beside(_part(nuisance))
+    if _simulates(soft):
+        out[RoughlyKnown(softer(nuisance))] = soft
+    return out
+
+
+def _simulates(column: Column) -> bool:
+    """Whether every prediction of a column is finite."""
+    return all(np.isfinite(window).all() for window in column)
 
 
 def softer(nuisance: Nuisance) -> str:
