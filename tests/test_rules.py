@@ -240,6 +240,8 @@ def test_a_hypothesis_near_the_best_is_fitted_too():
     assert rules.worth_trying(score=901.0, best=1000.0, gain=1000.0)
     assert not rules.worth_trying(score=899.0, best=1000.0, gain=1000.0)
     assert rules.worth_trying(score=11.0, best=20.0, gain=20.0)  # within what keeps a rival
+    assert rules.worth_trying(score=801.0, best=1000.0, gain=1000.0, coarse=True)
+    assert not rules.worth_trying(score=799.0, best=1000.0, gain=1000.0, coarse=True)
 
 
 def test_what_an_answer_leaves_is_said():

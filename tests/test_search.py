@@ -233,7 +233,7 @@ def test_what_others_were_weighed_beside_is_not_fitted_with_them_from_afar(monke
         return SimpleNamespace(price=100.0, fitted=None)
 
     fits = SimpleNamespace(believed=believed, gap_after=lambda _: gap)
-    monkeypatch.setattr(shortlist, "_first_few", lambda _, options: list(options))
+    monkeypatch.setattr(shortlist, "_first_few", lambda _, options, coarse: list(options))
     assert shortlist.best_of(fits, [with_wind, two], but=BOTH.keys)[1] is gap
     assert asked == [two.keys]
     assert shortlist.best_of(fits, [with_wind], patient=False, but=BOTH.keys) is None
@@ -265,6 +265,30 @@ def test_a_fit_that_still_promises_is_made_anew(fits):
     fits.answers[("rolling", "as given")] = fit(1530.0, "rolling", promised=1500.0)
     fits.answers[("rolling", "track of rolling")] = fit(1501.0, "rolling")
     assert searching().fit(ONE).fitted.total == 1501.0
+
+
+@pytest.mark.parametrize(("offset", "end"), [(2.9, 1290.0), (2.0, 1500.0)])
+def test_a_fit_that_goes_far_is_made_anew_as_long_as_that_brings_much(fits, offset, end):
+    """Columns of the chair as given led a scrub of 4.7 N m to 3.7, its centre of mass 3 sd off."""
+    totals = (1500.0, 1400.0, 1300.0, 1290.0, 1200.0)
+    for total, before in zip(totals, ("as given", *totals), strict=False):
+        ended = fit(total, "rolling")
+        ended.variant = replace(ended.variant, offsets={"centre_x": offset})
+        ended.track = total
+        fits.answers["rolling", before] = ended
+    assert searching().fit(ONE).fitted.total == end
+
+
+def test_where_the_linear_order_is_coarse_more_are_fitted(monkeypatch):
+    gains = (1000.0, 950.0, 940.0, 930.0, 850.0, 820.0, 810.0, 700.0)
+    options = [Hypothesis((effect(f"effect {k}"),), gain=g, score=g) for k, g in enumerate(gains)]
+    monkeypatch.setattr(shortlist, "_commonest", lambda _, options: options[0])
+    assert shortlist._first_few(None, options, coarse=False) == options[:3]
+    assert shortlist._first_few(None, options, coarse=True) == options[:6]
+    assert shortlist._first_few(None, [options[0], *options[5:]], coarse=True) == [
+        options[0],
+        *options[5:7],
+    ]
 
 
 def test_a_gap_is_laid_to_a_further_effect_only_once_the_first_is_fitted_anew(fits, monkeypatch):

@@ -43,6 +43,7 @@ PENALTY = 10.0  # chi2 that a parameter must bring: log of the number of samples
 WORTH = 15.0  # chi2 that a further effect must bring besides the penalty of its parameters
 LINEAR = 0.1  # share of its gain by which the linear promise of a hypothesis may be wrong
 NEXT = 0.1  # share of the best linear gain by which a hypothesis that is fitted too may be behind
+COARSE = 0.2  # the same share around a chair that is far from the data
 TIE = 6.0  # chi2 within which hypotheses fit alike
 # of the gain of all: what forms that are 4.5 % wrong leave, so less is no further effect
 # (assumption; the rocking on its tires of a chair that is a little stiffer leaves as much)
@@ -440,13 +441,14 @@ def may_be_worth_adding(*, promised: float, parameters: int, gain: float) -> boo
     return promised >= HOPELESS * max(needed(parameters), LEFT_BY_FORM * gain)
 
 
-def worth_trying(*, score: float, best: float, gain: float) -> bool:
+def worth_trying(*, score: float, best: float, gain: float, coarse: bool = False) -> bool:
     """Whether a hypothesis is fitted beside the best, which leaves a gap.
 
     Args:
       score, best: linear, of both. gain: chi2 of the best.
+      coarse: whether the chair around which these were made is far from the data.
     """
-    return best - score < max(NEXT * gain, RIVAL_CHI2)
+    return best - score < max((COARSE if coarse else NEXT) * gain, RIVAL_CHI2)
 
 
 def ends_elsewhere(*, behind: float, promised: float, gain: float) -> bool:

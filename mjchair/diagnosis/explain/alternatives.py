@@ -14,9 +14,9 @@ import numpy as np
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import hypotheses, whole_sizes
 from mjchair.diagnosis.explain.choice import Tried
-from mjchair.diagnosis.explain.fits import Fits, believable, goes_far
+from mjchair.diagnosis.explain.fits import Fits, believable
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
-from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis.explain.screening import Base, goes_far
 from mjchair.diagnosis.explain.shortlist import WithGap, best_of, better
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bounded import Reduced
@@ -30,14 +30,15 @@ def or_as_given(fits: Fits, here: WithGap | None) -> WithGap | None:
 
     What is roughly known may take an effect for itself, some numbers far from what they are
     known to be. Then linear algebra that is wrong by little of a large effect does not see the
-    effect; with nearer walls it does. From there on it weighs with these.
+    effect; with nearer walls it does. From there on it weighs with these. The chair as given is
+    then far from the data, and the order of effects around it is coarse: more of them are fitted.
     """
     wide = fits.base
     if not goes_far(wide.plain):
         return here
     if here is not None and not here[1].exists and not goes_far(here[0].fitted):
         return here
-    return _or_weighed_by(fits, wide.reduced.narrowed(NARROW), here)
+    return _or_weighed_by(fits, wide.reduced.narrowed(NARROW), here, coarse=True)
 
 
 def or_by_most_windows(fits: Fits, here: WithGap | None) -> WithGap | None:
@@ -54,11 +55,14 @@ def or_by_most_windows(fits: Fits, here: WithGap | None) -> WithGap | None:
     return _or_weighed_by(fits, bounded.reduce(wide.system, most), here)
 
 
-def _or_weighed_by(fits: Fits, reduced: Reduced, here: WithGap | None) -> WithGap | None:
+def _or_weighed_by(
+    fits: Fits, reduced: Reduced, here: WithGap | None, coarse: bool = False
+) -> WithGap | None:
     """The single effect, or a better one by other linear algebra, which then weighs on."""
     before = fits.base
     fits.base = replace(before, reduced=reduced)
-    other = best_of(fits, hypotheses.singles(reduced, before.starts), patient=False)
+    options = hypotheses.singles(reduced, before.starts)
+    other = best_of(fits, options, patient=False, coarse=coarse)
     best = better(here, other)
     if best is here:
         fits.base = before

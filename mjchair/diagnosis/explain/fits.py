@@ -22,12 +22,12 @@ from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.multistart import MultiStart, made_anew
 from mjchair.diagnosis.explain.near_fit import NearFit, near_fit
 from mjchair.diagnosis.explain.screening import (
-    FAR,
     Base,
     Found,
     Say,
     gain,
     gap_after,
+    goes_far,
     nuisances_of,
 )
 from mjchair.diagnosis.fit.nonlinear import Fitted
@@ -231,11 +231,6 @@ def with_form_errors(fitted: Fitted) -> Fitted:
                 size = abs(term.values[p.name] - p.neutral)
                 std[key] = math.hypot(std[key], rules.SIZE_BY_FORM * size)
     return replace(fitted, std=std)
-
-
-def goes_far(fitted: Fitted) -> bool:
-    """Whether anything that is only roughly known is far from what it is known to be."""
-    return any(abs(by) >= FAR for by in fitted.variant.offsets.values())
 
 
 def believable(fitted: Fitted) -> bool:

@@ -9,7 +9,8 @@ from __future__ import annotations
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import alternatives, left_over
 from mjchair.diagnosis.explain.choice import Tried
-from mjchair.diagnosis.explain.fits import Fits, goes_far
+from mjchair.diagnosis.explain.fits import Fits
+from mjchair.diagnosis.explain.screening import goes_far
 from mjchair.diagnosis.explain.shortlist import (
     WithGap,
     best_of,

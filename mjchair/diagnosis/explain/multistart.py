@@ -16,8 +16,7 @@ from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import hypotheses
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.near_fit import NearFit
-from mjchair.diagnosis.explain.screening import Base, Say, gain, silent
-from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.explain.screening import Base, Say, gain, goes_far, silent
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ColumnId
 from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
@@ -27,6 +26,7 @@ from mjchair.diagnosis.replay.window_states import Track
 from mjchair.errors import MjchairError
 
 SHARES = (0.875, 0.75, 0.625, 0.5, 0.375, 0.25, 0.125)  # of linear coefficients, for a new start
+ANEW = 3  # times that a fit which goes far begins again where it ended, as long as that brings much
 SMALLER = 0.1  # of an effect, where a fit begins once more that went astray
 
 
@@ -157,7 +157,7 @@ class MultiStart:
             return None
         if self._is_behind(fitted):
             pass  # what it would gain if all were made anew decides nothing
-        elif bounded.at_walls(fitted.variant.offsets):
+        elif goes_far(fitted):
             fitted = self._around_terms(fitted)
         elif rules.is_stuck(total=fitted.total, promised=fitted.promised):
             fitted = made_anew(self.base.bench, fitted.variant, fitted.track) or fitted
@@ -206,10 +206,18 @@ class MultiStart:
         """The fit from the effects that were reached, what is roughly known as given; the better.
 
         A large effect changes how a chair answers to its centre of mass or its inertia. Columns
-        that were made without it then push these numbers to the ends of what they may be.
+        that were made without it then push these numbers far from what they are known to be, and
+        those that are made once anew are still of a chair that is not the one they lead to.
         """
-        again = made_anew(self.base.bench, replace(fitted.variant, offsets={}), fitted.track)
-        return _better(fitted, again) or fitted
+        start = replace(fitted.variant, offsets={})
+        for _ in range(ANEW):
+            again = made_anew(self.base.bench, start, fitted.track)
+            if again is None or fitted.total - again.total < rules.WORTH:
+                return _better(fitted, again) or fitted
+            fitted, start = again, again.variant
+            if self._is_behind(fitted):
+                break
+        return fitted
 
 
 def made_anew(

@@ -385,6 +385,11 @@ def reaches(base: Base, fitted: Fitted) -> bool:
     return rules.reaches(total=fitted.total, promised=fitted.promised, gain=gained)
 
 
+def goes_far(fitted: Fitted) -> bool:
+    """Whether anything that is only roughly known is far from what it is known to be."""
+    return any(abs(by) >= FAR for by in fitted.variant.offsets.values())
+
+
 def gap_after(base: Base, fitted: Fitted) -> Gap:
     """Test what a fit leaves, with its own parameters free where it reaches what it promises."""
     system, windows = tested(base, fitted)

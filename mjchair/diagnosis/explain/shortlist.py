@@ -22,7 +22,7 @@ from mjchair.diagnosis.explain.left_out import held_out, with_terms
 from mjchair.diagnosis.explain.screening import gain
 
 TRIED = 3  # hypotheses of one size, where the first leaves a gap
-LISTED = 6  # hypotheses of one size, until one can be
+LISTED = 6  # hypotheses of one size, until one can be, or where the linear order is coarse
 
 WithGap = tuple[Tried, Gap]  # a fit, and the gap that it leaves
 
@@ -72,7 +72,11 @@ def promising(fits: Fits, best: Tried) -> list[Hypothesis]:
 
 
 def best_of(
-    fits: Fits, options: Sequence[Hypothesis], patient: bool = True, but: Collection[str] = ()
+    fits: Fits,
+    options: Sequence[Hypothesis],
+    patient: bool = True,
+    but: Collection[str] = (),
+    coarse: bool = False,
 ) -> WithGap | None:
     """The best hypothesis with its fit, and the gap that it leaves; None: none can be.
 
@@ -81,10 +85,12 @@ def best_of(
     Args:
       patient: whether, where none of these can be, the list is gone on along.
       but: effects; a hypothesis that has all of them is not fitted. Empty: any may be fitted.
+      coarse: whether the linear order is of a chair far from the data: then more are fitted.
     """
     if not options or options[0].score <= 0.0:
         return None
-    listed = [h for h in _first_few(fits, options) if not but or not set(but) <= set(h.keys)]
+    few = _first_few(fits, options, coarse)
+    listed = [h for h in few if not but or not set(but) <= set(h.keys)]
     top = left = None
     for h in listed:
         more = fits.believed(h, top)
@@ -100,16 +106,16 @@ def best_of(
     return None if top is None else (top, left or fits.gap_after(top.fitted))
 
 
-def _first_few(fits: Fits, options: Sequence[Hypothesis]) -> list[Hypothesis]:
+def _first_few(fits: Fits, options: Sequence[Hypothesis], coarse: bool) -> list[Hypothesis]:
     """The hypotheses that are fitted: the best, and those that may be as good."""
     first = _commonest(fits, options)
     near = [
         h
         for h in options
         if h.keys != first.keys
-        and rules.worth_trying(score=h.score, best=first.score, gain=first.gain)
+        and rules.worth_trying(score=h.score, best=first.score, gain=first.gain, coarse=coarse)
     ]
-    return [first, *near[: TRIED - 1]]
+    return [first, *near[: (LISTED if coarse else TRIED) - 1]]
 
 
 def better(one: WithGap | None, other: WithGap | None) -> WithGap | None:
