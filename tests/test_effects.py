@@ -237,3 +237,13 @@ def test_of_two_torque_gains_the_difference_is_said():
     both = said({"left": 0.171, "right": 0.007}, {"left": 0.044, "right": 0.038})
     assert both == "left +17.1 ± 4.4 %, right +0.7 ± 3.8 %, left less right +16.4 %"
     assert said({"left": 0.163, "right": 0.0}, {"left": 0.004}) == "left +16.3 ± 0.4 %"
+
+
+@pytest.mark.parametrize(
+    ("channel", "most"),
+    [("left_wheel_speed", 2.0), ("imu_gyro.z", 0.4), ("velocity.x", 1.0), ("heading", math.pi)],
+)
+def test_a_bias_is_no_larger_than_a_sensor_may_have(channel, most):
+    """Two wheels 10 rad/s off explained a chair that slowed down too soon."""
+    (bias,) = find("sensor_bias", channel).parameters
+    assert (bias.low, bias.high) == pytest.approx((-most, most))

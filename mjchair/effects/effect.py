@@ -41,7 +41,7 @@ class Parameter:
       cautious: the most that one step of a fit may move it.
       each_run: whether it is new in every run, as a phase is.
       whole: sizes at which a chair does what no small change foretells: a tire slides, a wheel
-        shimmies. Where small changes explain nothing, fits begin at these too.
+        shimmies, a turn ends at once. Where small changes explain nothing, fits begin at these too.
     """
 
     name: str

@@ -19,6 +19,7 @@ from mjchair.model import parts
 from mjchair.simulation.channels import TIRE
 
 COUNTED = 0.2  # how often a scale is wrong that counts or is calibrated, over others (assumption)
+LARGEST = 20.0  # times the usual bias: 2 rad/s of a wheel, 4 m/s^2 (assumption)
 COMPONENTS = {".x": 0, ".y": 1, ".z": 2} | {f".{part}": k for k, (part, _) in enumerate(TIRE)}
 
 
@@ -92,7 +93,9 @@ def sensor_effects(channel: str) -> tuple[Effect, ...]:
     typical, unit = kind.fault, kind.unit
     signature = "one channel only, and no force is consistent with it"
     source = "sizes of uncalibrated sensors; assumed"
-    bias = Parameter("bias", unit, typical, -1e3 * typical, 1e3 * typical)
+    half_turn = np.pi if unit == "rad" else 0.0  # an angle's zero may be anywhere
+    most = max(LARGEST * typical, half_turn)
+    bias = Parameter("bias", unit, typical, -most, most)
     scale = Parameter("scale", "1", 0.05, -0.9, 9.0)
     delay = Parameter("delay", "s", 0.02, 0.0, 0.5)
     lags = signature + "; its lag grows with the rate of change"

@@ -16,7 +16,7 @@ def edit(spec: mujoco.MjSpec, moment: float) -> None:
 
 EFFECT = Effect(
     name="turning_scrub",
-    parameters=(Parameter("moment", "N m", 1.0, 0.0, 50.0),),
+    parameters=(Parameter("moment", "N m", 1.0, 0.0, 50.0, whole=(2.0, 4.0, 8.0)),),
     signature="-sign(yaw rate), also near v = 0",
     source="a patch of 8 cm under 300 N at friction 0.8 gives some 5 N m; assumed",
     edit=edit,

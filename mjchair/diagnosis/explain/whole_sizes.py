@@ -5,7 +5,8 @@ size alone already brings more than it costs, and not far less than another expl
 far the ends of fits that begin a little beside the chosen one lie apart.
 
 Linear algebra is blind to these: a tire with a little less friction does nothing until it slides,
-and a relaxation length does little until the wheels shimmy. So the windows that disagree most are
+a relaxation length does little until the wheels shimmy, and a moment against turning ends a turn
+where a little of it only slows it. So the windows that disagree most are
 simulated at a few sizes (`Parameter.whole`), their states fitted anew at each, and then between the
 best and its neighbours.
 """
