@@ -1,11 +1,14 @@
 """Studies that cannot be right: one line says what, exit code 2, and nothing is written."""
 
 import re
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 
 from mjchair import cli
+from mjchair.diagnosis.data.study_file import read_study
+from mjchair.errors import MjchairError
 
 TIME = np.round(np.arange(0.0, 4.0, 0.02), 6)
 SIDES = ("left", "right")
@@ -303,3 +306,17 @@ def test_bad_studies_are_one_line_and_nothing_is_written(case, tmp_path, capsys)
     assert said.startswith("mjchair: ") and said.count("\n") == 1, said
     assert "Error" not in said and re.search(words, said), said
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("more", "refused"), [(0.05, False), (0.5, True)])
+def test_a_centre_of_mass_aside_is_no_torque_of_the_other_sign(more, refused, tmp_path):
+    """A straight push turns such a chair, whichever rim is pushed a little harder."""
+    push = 6.0 * np.sin(2.0 * TIME)
+    columns = coast() | {
+        "imu_gyro.z": -0.25 * np.cos(2.0 * TIME),  # left while both push
+        "left_wheel": (1.0 + more) * push,
+        "right_wheel": (1.0 - more) * push,
+    }
+    write(tmp_path / "study", columns)
+    with pytest.raises(MjchairError, match="swapped") if refused else nullcontext():
+        read_study(tmp_path / "study")

@@ -29,6 +29,7 @@ PUSHED = 0.3  # m/s, that a chair gains at PULLED or more only if something driv
 PULLED = 0.3  # m/s^2, as a slope of 3 %
 TOLD = 0.3  # of a torque, in rms, that must go with speed and its gain (0.34 of one in strokes)
 ALIKE = 0.5  # of their sum: torques whose difference is less are alike (rms)
+ASIDE = 0.2  # of their sum: a centre of mass 55 mm aside turns a chair as much as such a difference
 WORK = 40.0  # J that torques take from a chair, more than it lost: a sign may be wrong (assumption)
 SIDES = ("left", "right")
 
@@ -137,13 +138,16 @@ def _check_moment(trial: Trial, inputs: Inputs, turns: dict[str, Story]) -> None
 def _moment_shares(inputs: Inputs, story: Story) -> Array:
     """Of the moment of the torques, what goes with a faster turn, and with the turn, (2,).
 
-    Zero where the two do not make up the moment.
+    Zero where the two do not make up the moment, and where it is so small a part of the torques
+    that a centre of mass aside turns the chair as much when both wheels drive alike.
     """
     grid, rate = story.time, story.values
     if grid.size < 8 or np.sqrt(np.mean(rate**2)) < YAW:
         return np.zeros(2)
     left, right = (_torque_at(inputs, side, grid) for side in SIDES)
     moment = right - left
+    if np.linalg.norm(moment) < ASIDE * np.linalg.norm(right + left):
+        return np.zeros(2)
     causes = np.column_stack([np.gradient(rate, grid), rate])
     shares = np.linalg.lstsq(causes, moment, rcond=None)[0]
     told = np.linalg.norm(causes @ shares) > SWAPPED * np.linalg.norm(moment)
