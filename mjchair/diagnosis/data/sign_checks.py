@@ -113,12 +113,16 @@ def _check_equal(trial: Trial, inputs: Inputs, axle: RearAxle, wheels: Story | N
     if wheels is None or np.sqrt(np.mean(wheels.values**2)) < SPUN:
         return
     left, right = (_torque_at(inputs, side, wheels.time) for side in SIDES)
-    alike = np.linalg.norm(left - right) < ALIKE * np.linalg.norm(left + right)
-    if alike and _roll_opposite(trial, axle):
+    if _differ_less(left, right, ALIKE) and _roll_opposite(trial, axle):
         raise MjchairError(
             f"{trial.name}: the wheels roll opposite ways, and their torques are alike: does one "
             "wheel count down as it rolls forward? Turn its sign"
         )
+
+
+def _differ_less(left: Array, right: Array, share: float) -> bool:
+    """Whether the difference of two torques (n,) is less than a share of their sum, in rms."""
+    return bool(np.linalg.norm(left - right) < share * np.linalg.norm(left + right))
 
 
 def _check_moment(trial: Trial, inputs: Inputs, turns: dict[str, Story]) -> None:
@@ -146,7 +150,7 @@ def _moment_shares(inputs: Inputs, story: Story) -> Array:
         return np.zeros(2)
     left, right = (_torque_at(inputs, side, grid) for side in SIDES)
     moment = right - left
-    if np.linalg.norm(moment) < ASIDE * np.linalg.norm(right + left):
+    if _differ_less(left, right, ASIDE):
         return np.zeros(2)
     causes = np.column_stack([np.gradient(rate, grid), rate])
     shares = np.linalg.lstsq(causes, moment, rcond=None)[0]

@@ -41,7 +41,6 @@ from mjchair.errors import MjchairError
 Say = Callable[[str], None]
 NEAR = 0.5  # prior standard deviations that columns of nuisances are good for
 SEEN = 1.0  # sigmas that one standard deviation of a nuisance changes
-FAR = 2.5  # prior standard deviations: a nuisance there is not what moved
 LOUD = 0.01  # share of the power that may shake a chair: below it noise hides nothing
 QUIETER = 0.25  # of the power of what shakes the chair: an explanation that leaves less is right
 PROMISES = 0.5  # of that power: fits are made where linear algebra leaves less than this share
@@ -387,7 +386,7 @@ def reaches(base: Base, fitted: Fitted) -> bool:
 
 def goes_far(fitted: Fitted) -> bool:
     """Whether anything that is only roughly known is far from what it is known to be."""
-    return any(abs(by) >= FAR for by in fitted.variant.offsets.values())
+    return any(rules.is_far(by) for by in fitted.variant.offsets.values())
 
 
 def gap_after(base: Base, fitted: Fitted) -> Gap:
