@@ -85,6 +85,7 @@ def test_just_inside_each_limit_it_is_still_named(allowed):
         {"closure": rules.CLOSES - 0.01},
         {"closure": rules.PARTLY},
         {"probability": rules.PROBABLE - 0.01},
+        {"rivals": True},
         {"once": True},
         {"gap_left": True, "runs": 1},
     ],

@@ -200,6 +200,7 @@ def standing(
         sigmas=_sigmas(choice),
         at_bound=bool(fitted.at_bound),
         probability=of_effects(probability, choice.hypothesis.keys),
+        rivals=bool(exchanged(choice)),
         once=_once(base, choice, held),
         runs=len(base.bench.simulator.study.fitted),
         held_out=held,

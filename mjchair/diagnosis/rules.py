@@ -132,7 +132,8 @@ class Standing:
         they are fitted to the others.
       sigmas: of every effect, how far it is from neutral in standard errors.
       at_bound: whether a parameter ended on a bound. probability: of the effects, against rivals
-        and all else. once: whether something that happened once fits as well.
+        and all else. rivals: whether something could stand in the place of one of them. once: whether
+        something that happened once fits as well.
       runs: that were fitted to.
       held_out: the trials that no fit saw; None where there are none.
       walls: how many numbers that are only roughly known stand on their walls with the effects in:
@@ -148,6 +149,7 @@ class Standing:
     sigmas: tuple[float, ...]
     at_bound: bool
     probability: float = 1.0
+    rivals: bool = False
     once: bool = False
     runs: int = 2
     held_out: HeldOut | None = None
@@ -191,9 +193,10 @@ def verdict(gap: bool, choice: Standing | None) -> Verdict:
         return Verdict.NONE
     if choice is None or not explains(choice):
         return Verdict.UNKNOWN
+    # of 22 choices stated at 95 % beside a rival that was not ruled out, 19 were right (docs)
     # beside a number that is pushed to its wall, what pushes it may be all that is missing
-    once = choice.once or choice.one_alike
-    alone = not once and choice.probability >= PROBABLE and not choice.walls
+    beside = choice.rivals or choice.once or choice.one_alike
+    alone = not beside and choice.probability >= PROBABLE and not choice.walls
     # in a single run nothing tells an effect from what is left beside it
     whole = not choice.gap_left or choice.runs > 1
     carried = choice.held_out is None or carries_over(choice.held_out)
