@@ -122,6 +122,21 @@ def test_what_is_only_roughly_known_changes_no_more_than_the_fit_leaves_open(bas
     assert left_out._changed(base, fitted, held) <= known[at, at] * (1.0 + 1e-6)
 
 
+def test_what_a_fit_moved_of_a_sensor_is_no_change_where_its_effect_takes_it_over(base):
+    """The scale of an encoder, 40 of its deviations off, changed chi2 by 553 000 of a gap of -30:
+    without the effect, the fit had it in a number that stands in no prediction."""
+    plain = base.plain
+    name = RoughlyKnown("rolling_radius")
+    at = plain.system.places[name]
+    moved = [p + 3.0 * c for p, c in zip(plain.track.predicted, plain.columns[name], strict=True)]
+    before = plain.step.copy()
+    before[at] += 3.0
+    lacking = replace(base, plain=replace(plain, step=before))
+    fitted = replace(plain, track=SimpleNamespace(predicted=moved))
+    assert left_out.on_held_out(lacking, fitted).changed == pytest.approx(0.0, abs=1e-6)
+    assert left_out.on_held_out(base, fitted).changed > 1.0
+
+
 def foretold(rng, sizes, missing=0.0):
     """Chi2 over its dof of two held-out runs, foretold by two that were fitted to, and as they are.
 

@@ -23,6 +23,7 @@ PARTLY = 0.5  # share that an effect closes which is part of an answer, with a r
 CARRIED = 0.5  # share of the excess on held-out trials that it closes there
 BROUGHT = 0.2  # and that any answer closes there whose effects change more than the excess
 BY_NOISE = 2.0  # standard deviations by which noise may hide that they bring it
+AGAINST = 3.0  # standard deviations of noise below what is foretold, that speak against it
 PROBABLE = 0.95  # probability of a named effect
 FAR = 2.5  # standard deviations: what is only roughly known and was moved as far is measured
 SHOWN = 0.1  # probability of what is shown as a rival whatever its chi2
@@ -115,6 +116,11 @@ class HeldOut:
     def scatter(self) -> float:
         """Chi2 by which noise alone may be off."""
         return _scatter(self.dof)
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of what the effects bring, by noise alone: it is in both chi2."""
+        return 2.0 * math.sqrt(self.changed)
 
     @property
     def shown(self) -> bool:
@@ -217,13 +223,16 @@ def explains(choice: Standing) -> bool:
 def carries_over(held: HeldOut) -> bool:
     """Whether the held-out trials, which no fit has seen, do not speak against the effects.
 
-    A gap that shows in them must close by CARRIED of what the effects change there; none must open.
-    Effects that change next to nothing there, as a gyroscope's gain where nothing turns, have no
-    part in a gap of another cause.
+    Right effects bring there all that they change, give or take the noise. CARRIED of it is enough,
+    or of the gap where they change more than there is, since forms and sizes are a little off; less
+    speaks against them where noise does not explain it. Effects that change no more than noise
+    does, as a gyroscope's gain where nothing turns, have no part in a gap of another cause; they
+    must open none.
     """
-    if not held.shown:
+    if held.changed <= held.scatter:
         return not opens_a_gap(held)
-    return held.left < max(held.gap - CARRIED * min(held.gap, held.changed), held.scatter)
+    enough = CARRIED * min(held.gap, held.changed)
+    return held.before - held.after >= min(enough, held.changed - AGAINST * held.noise)
 
 
 def opens_a_gap(held: HeldOut) -> bool:
@@ -237,7 +246,7 @@ def opens_a_gap(held: HeldOut) -> bool:
     if not held.shown:
         return held.left >= held.gap + held.scatter
     least = held.gap * (1.0 - BROUGHT if held.changed >= held.gap else 1.0)
-    return held.left >= max(least + BY_NOISE * 2.0 * math.sqrt(held.changed), held.scatter)
+    return held.left >= max(least + BY_NOISE * held.noise, held.scatter)
 
 
 def shows_again(held: HeldOut) -> bool:

@@ -21,6 +21,7 @@ from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.elimination import eliminate_window
 from mjchair.diagnosis.fit.nonlinear import Fitted
+from mjchair.diagnosis.fit.slow_part import BAND, slow_components
 from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.replay.sampling import residual
 
@@ -165,14 +166,16 @@ def _foretold(base: Base, fitted: Fitted, windows: NDArray[np.int64]) -> tuple[f
 
 
 def _changed(base: Base, fitted: Fitted, windows: NDArray[np.int64]) -> float:
-    """Chi2 by which a fit foretells windows otherwise than the chair without effects.
+    """Chi2 by which a fit foretells the slow part of windows otherwise than without its effects.
 
     As far as the windows that were fitted to tell what is only roughly known: what a fit moved of
     it without a reason is no change by its effects.
     """
     plain, bench = base.plain, base.bench
     simulator, count = bench.simulator, base.plain.system.nuisance
-    columns = [plain.columns[c] for c in plain.system.columns[:count]]
+    known = plain.system.columns[:count]
+    columns = [plain.columns[c] for c in known]
+    moved = fitted.step[fitted.system.index(known)] - plain.step[:count]
     chi2, shown, told = 0.0, np.zeros(count), np.zeros((count, count))
     for i in (int(w) for w in windows):
         by = residual(fitted.track.predicted[i], plain.track.predicted[i], simulator.channels)
@@ -181,7 +184,10 @@ def _changed(base: Base, fitted: Fitted, windows: NDArray[np.int64]) -> float:
         left = eliminate_window(
             simulator, plain.track, bench.whitener, i, by, stacked, bench.process
         )
-        chi2, shown, told = chi2 + left.chi2, shown + left.b, told + left.G
+        slow = slow_components(left, count, bench.whitener.slow(i, BAND))[-1]
+        change, beside = slow[:, 0] + slow[:, 1:] @ moved, slow[:, 1:]
+        chi2 += float(change @ change)
+        shown, told = shown + beside.T @ change, told + beside.T @ beside
     return _beside_known(base, plain, chi2, shown, told)
 
 
