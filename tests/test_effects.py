@@ -28,6 +28,7 @@ CONTRACT = {
     "caster_friction": {"moment"},
     "caster_trail": {"length"},
     "torque_gain": {"left", "right"},
+    "torque_delay": {"delay"},
     "drive_lag": {"time_constant"},
     "back_emf": {"coefficient"},
     "weak_motor": {"left", "right"},

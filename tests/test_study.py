@@ -535,14 +535,14 @@ def test_a_measured_torque_lags_behind_no_motor(tmp_path):
     from mjchair.diagnosis.diagnose import study_effects
 
     torque = {"left_wheel": np.sin(TIME), "right_wheel": np.sin(TIME)}
-    motors = {"drive_lag", "back_emf"}
+    motors, rims = {"drive_lag", "back_emf"}, {"torque_delay"}
 
     def tried(head):
         study = mjchair.read_study(write(tmp_path, wheels() | torque, head=head))
-        return motors & {effect.name for effect in study_effects(study)}
+        return (motors | rims) & {effect.name for effect in study_effects(study)}
 
     assert tried('model = "manual"\n') == motors
-    assert tried('model = "manual"\ntorque = "measured"\n') == set()
+    assert tried('model = "manual"\ntorque = "measured"\n') == rims
     smartwheel = mjchair.read_study(samples.folder() / "smartwheel")
     assert not motors & {effect.name for effect in study_effects(smartwheel)}
     # the gain of a sensor is only roughly known, and that of a command is no such number

@@ -40,7 +40,7 @@ def study_effects(study: Study, more: Sequence[Effect] = ()) -> list[Effect]:
         for effect in known
         if not (effect.outdoors and study.indoors)
         and not (effect.place and study.unplaced)
-        and not (effect.commanded and study.torque_measured)
+        and effect.commanded in (None, not study.torque_measured)
     ]
     wrong = mistaken(study.channels, study.nuisance, study.driven_as_measured)
     suspected = (replace(effect, common=SUSPECTED * effect.common) for effect in more)

@@ -138,8 +138,8 @@ class Standing:
         they are fitted to the others.
       sigmas: of every effect, how far it is from neutral in standard errors.
       at_bound: whether a parameter ended on a bound. probability: of the effects, against rivals
-        and all else. rivals: whether something could stand in the place of one of them. once: whether
-        something that happened once fits as well.
+        and all else. rivals: whether something could stand in the place of one of them.
+      once: whether something that happened once fits as well.
       runs: that were fitted to.
       held_out: the trials that no fit saw; None where there are none.
       walls: how many numbers that are only roughly known stand on their walls with the effects in:

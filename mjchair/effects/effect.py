@@ -137,7 +137,8 @@ class Effect:
       driven: it shows only where something drives the chair.
       drive: True: of a power chair's drive (joystick, motors, battery), and only on a chair that
         has one; False: of torques that are given at the wheels, and on no such chair; None: any.
-      commanded: it shows only where torques are commands, and not what was measured at a push rim.
+      commanded: True: it shows only where torques are commands; False: only where they were
+        measured at push rims; None: wherever they come from.
       everywhere: every chair has a little of it, and present runs may not show it.
       common: how often it is what is missing, over most other effects (assumption).
       outdoors: it is there outdoors only.
@@ -165,7 +166,7 @@ class Effect:
     beside: bool = False
     driven: bool = False
     drive: bool | None = None
-    commanded: bool = False
+    commanded: bool | None = None
     everywhere: bool = False
     common: float = 1.0
     outdoors: bool = False

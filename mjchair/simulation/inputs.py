@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mjchair.drive.block import JOYSTICK
 from mjchair.errors import MjchairError, nearest
+from mjchair.model import torque_timing
 from mjchair.model.wheels import base_name
 from mjchair.rider.anatomy import JOINT_NAMES
 from mjchair.simulation import names
@@ -117,7 +118,8 @@ class Inputs(FrozenRecord):
         """Controls of every actuator of the model at the times given.
 
         Args:
-          model: the model whose actuators are driven.
+          model: the model whose actuators are driven. Where it says that torques were recorded late
+            (`torque_delay`), each is taken so much later from its column.
           time: (n,), s.
 
         Returns:
@@ -136,7 +138,8 @@ class Inputs(FrozenRecord):
             else:
                 if base_name(name) in JOYSTICK:
                     self._check_stick(name)
-                out[:, index] = self.at(name, time)
+                late = torque_timing.recorded_late(model, index)
+                out[:, index] = self.at(name, np.asarray(time, float) + late)
         return out
 
     def position(self, name: str, time: ArrayLike) -> NDArray[np.float64]:

@@ -309,10 +309,10 @@ class WindowSimulator:
         models = [job.model for job in jobs]
         model, begin = models[0], jobs[0].begin
         steps = self.steps(model, jobs[0].window)
-        kept: dict[tuple[int, int, float], Array] = {}
+        kept: dict[tuple[int, int, float, bytes], Array] = {}
         rows = []
         for job, m in zip(jobs, models, strict=True):
-            key = (id(job.window), m.nu, job.late)
+            key = (id(job.window), m.nu, job.late, m.actuator_user.tobytes())
             if key not in kept:
                 kept[key] = self.controls(m, job.window, steps, job.late)
             rows.append(kept[key])
