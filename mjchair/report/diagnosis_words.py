@@ -168,14 +168,11 @@ def remainder_words(diagnosis: Diagnosis) -> str:
     closed = max((e.closure for e in diagnosis.effects), default=0.0)
     goes = ", which goes with " + str(diagnosis.drivers[0].goes_with) if diagnosis.drivers else ""
     ends = _at_their_ends(diagnosis)
-    left = [f"with {ends} as far from what the study says as is believed"] if ends else []
+    only = f" only with {ends} as far from what the study says as is believed" if ends else ""
     after = diagnosis.gap.after if diagnosis.gap else None
-    if not ends or after is None or after > 1.0:
-        left.append(f"and a remainder is left{goes}")
-    return (
-        f"More is missing than what is named here: that explains {closed:.0%} of the gap, "
-        f"{', '.join(left)}. "
-    )
+    left = f", and a remainder is left{goes}" if not ends or after is None or after > 1.0 else ""
+    explains = f"that explains {closed:.0%} of the gap{only}{left}"
+    return f"More is missing than what is named here: {explains}. "
 
 
 def _at_their_ends(diagnosis: Diagnosis) -> str:
