@@ -302,7 +302,7 @@ def test_what_is_named_beside_more_that_is_missing_is_no_last_word():
     assert "look for what is left" in words.next_step(found)
     assert "of the gap, and a remainder is left. The chair lacks" in words.missing(found)
     found.correction = Variant((), {"mass": -3.0, "centre_x": 2.0})
-    said = "of the gap only with the mass of chair and person together as far from what the study says "
+    said = "gap only with the mass of chair and person together as far from what the study says "
     assert said + "as is believed. The chair" in words.missing(found)
     found.gap = dataclasses.replace(found.gap, after=1.3)
     assert "as is believed, and a remainder is left. The chair" in words.missing(found)
