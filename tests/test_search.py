@@ -817,6 +817,11 @@ def test_an_effect_of_a_whole_size_may_be_the_better_one(fits, monkeypatch, tota
     # where nothing asks for one, none is looked for
     stays = alternatives.or_whole(looking, closed) is closed
     assert stays == (not shimmies or total > 1500.0)
+    # an inertia three deviations off stood, with a centre of mass, for a turn that a scrub ends
+    far = replace(here[0].fitted.variant, offsets={"inertia": 3.0})
+    pushed = replace(here[0], fitted=SimpleNamespace(**{**vars(here[0].fitted), "variant": far}))
+    closed = (pushed, SimpleNamespace(exists=False))
+    assert (alternatives.or_whole(looking, closed) is closed) == (total > 1500.0)
 
 
 def test_a_fit_that_cannot_come_near_the_best_is_not_started_again(fits):

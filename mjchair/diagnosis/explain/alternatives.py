@@ -107,13 +107,14 @@ def _other_forms(fits: Fits, best: Tried) -> list[Hypothesis]:
 def or_whole(fits: Fits, here: WithGap) -> WithGap:
     """The single effect, or one of a whole size that is better.
 
-    These are tried where the first leaves a gap or a caster shimmies. Small changes do not lead
-    there, and what they lead to may stand in for it: a patch of the floor for wheels that
-    shimmy once.
+    These are tried where the first leaves a gap or what is roughly known far away, or a caster
+    shimmies. Small changes do not lead there, and what they lead to may stand in for it: a patch of
+    the floor for wheels that shimmy once, a centre of mass and an inertia for a turn that ends.
     """
-    if not here[1].exists and not whole_sizes.shimmies(fits.base):
-        return here
     best = here[0]
+    settled = not here[1].exists and not goes_far(best.fitted)
+    if settled and not whole_sizes.shimmies(fits.base):
+        return here
     for start, fitted in whole_sizes.fits(fits.base, fits.anew(best)):
         tried = Tried(fits.weigh([start]), fitted)
         fits.keep_better(tried)
