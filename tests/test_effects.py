@@ -248,3 +248,11 @@ def test_a_bias_is_no_larger_than_a_sensor_may_have(channel, most):
     """Two wheels 10 rad/s off explained a chair that slowed down too soon."""
     (bias,) = find("sensor_bias", channel).parameters
     assert (bias.low, bias.high) == pytest.approx((-most, most))
+
+
+def test_wheels_lean_outwards_no_further_than_a_bent_axle():
+    """A sprint whose torque was estimated from its own motion had camber of -17 degrees."""
+    spec, camber = mjchair.load_spec(), find("camber")
+    assert camber.on(spec).parameter("angle").low == pytest.approx(-0.05, abs=1e-9)
+    camber.apply(spec, {"angle": 0.2})
+    assert camber.on(spec).parameter("angle").low == pytest.approx(-0.25, abs=1e-9)
