@@ -286,6 +286,16 @@ def test_a_sensor_at_fault_is_no_lack_of_the_chair(name, parameter, value, unit,
     assert words.next_step(alone).endswith("the chair lacks nothing.")
     left = dataclasses.replace(alone, more_missing=True)
     assert words.next_step(left).endswith("correct what the sensor shows.")
+    late = NamedEffect(
+        name="torque_delay",
+        parameters={},
+        closure=1.0,
+        remark="the torques came late",
+        recording=True,
+    )
+    alone = Diagnosis(verdict=Verdict.NAMED, effects=[late])
+    assert words.missing(alone) == "The torques came late (**torque delay**)."
+    assert words.next_step(alone).endswith("correct what was recorded; the chair lacks nothing.")
     both = Diagnosis(verdict=Verdict.NAMED, effects=[fault, ROLLING])
     assert "The chair lacks **rolling resistance** (" in words.missing(both)
     assert f"), and the sensor of heading {said}" in words.missing(both)

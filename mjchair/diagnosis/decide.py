@@ -167,6 +167,7 @@ def _in_one_run(found: InOneRun, gap: Gap) -> OneRun:
                 parameters=parameters,
                 closure=closed,
                 channel=term.effect.channel,
+                recording=term.effect.recording,
             )
         )
     return OneRun(trial=found.trial, effects=tuple(effects), gain=found.gain, others=found.others)
@@ -361,6 +362,7 @@ def _named(fitted: Fitted, closed: float) -> list[NamedEffect]:
                 closure=closed,
                 channel=channel,
                 remark=notes.remark(fitted, term),
+                recording=term.effect.recording,
             )
         )
     return out

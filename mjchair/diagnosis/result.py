@@ -56,6 +56,7 @@ class NamedEffect:
       name, channel: of the effect; a channel only for effects of a sensor.
       closure: share of the excess that all named effects close together.
       remark: what the parameters say together, where that is no list of numbers; else empty.
+      recording: whether it is of how the runs were recorded, as those of a sensor are as well.
     """
 
     name: str
@@ -63,6 +64,12 @@ class NamedEffect:
     closure: float
     channel: str | None = None
     remark: str = ""
+    recording: bool = False
+
+    @property
+    def of_chair(self) -> bool:
+        """Whether it is something that the chair lacks."""
+        return self.channel is None and not self.recording
 
     @property
     def key(self) -> str:

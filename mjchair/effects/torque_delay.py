@@ -40,5 +40,6 @@ EFFECT = Effect(
     commanded=False,
     drive=False,
     instead=("input_timing",),
+    recording=True,
     remark=_size,
 )

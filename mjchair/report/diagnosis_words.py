@@ -94,10 +94,17 @@ def _sets(alternatives: Sequence[Sequence[str]]) -> str:
 
 
 def found_words(effects: Sequence[NamedEffect]) -> str:
-    """What is missing on the chair, and what its sensors show wrongly, as one clause."""
-    lacks = " and ".join(effect_words(e) for e in effects if e.channel is None)
+    """What is missing on the chair, and what was recorded wrongly, as one clause."""
+    lacks = " and ".join(effect_words(e) for e in effects if e.of_chair)
     chair = [f"the chair lacks {lacks}"] if lacks else []
-    return ", and ".join(chair + [sensor_words(e) for e in effects if e.channel is not None])
+    return ", and ".join(chair + [recording_words(e) for e in effects if not e.of_chair])
+
+
+def recording_words(effect: NamedEffect) -> str:
+    """What was recorded wrongly, as a clause: by a sensor, or of all columns of a kind."""
+    if effect.channel is not None:
+        return sensor_words(effect)
+    return f"{effect.remark} ({bold(effect.name)})"
 
 
 def sensor_words(effect: NamedEffect) -> str:
@@ -306,9 +313,11 @@ def next_step(diagnosis: Diagnosis) -> str:
     if not diagnosis.next_experiment:
         if diagnosis.verdict == Verdict.NONE:
             return "Nothing is needed; use the chair as it is."
-        if diagnosis.effects and all(e.channel is not None for e in diagnosis.effects):
+        if diagnosis.effects and not any(e.of_chair for e in diagnosis.effects):
             chair = "" if diagnosis.more_missing else "; the chair lacks nothing"
-            return f"These data decide: correct what the sensor shows{chair}."
+            sensor = all(e.channel is not None for e in diagnosis.effects)
+            wrong = "the sensor shows" if sensor else "was recorded"
+            return f"These data decide: correct what {wrong}{chair}."
         if diagnosis.more_missing:
             below = "; what goes with it is listed below" if known_drivers(diagnosis) else ""
             return (
