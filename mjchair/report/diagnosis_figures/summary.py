@@ -46,7 +46,16 @@ def _bars(ax: Axes, diagnosis: Diagnosis) -> None:
     ax.bar(names, values, color=colours, width=0.6)
     ax.set_xlim(-0.7, len(bars) - 0.3)
     for k, value in enumerate(values):
-        ax.text(k, value, size(value), ha="center", va="bottom", fontsize=9, bbox=PLATE)
+        ax.annotate(
+            size(value),
+            (k, value),
+            xytext=(0, 5),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize=9,
+            bbox=PLATE,
+        )
     ax.axhline(gap.noise_floor, color="0.3", ls=":", lw=1.3)
     ax.set_ylim(0.0, 1.18 * max(*values, gap.noise_floor))
     ax.set_ylabel("left over the noise (1)", fontsize=9)
