@@ -134,6 +134,8 @@ def hide(
     effect.apply(spec, chosen)
     files: dict[str, str | bytes] = {}
     study: dict[str, Any] = {"model": _told(model), "scene": "flat"}
+    if effect.commanded is False:  # else it is not looked for
+        study["torque"] = "measured"
     if chair.given():
         study["chair"] = dict(chair.given())
     study |= {"noise": NOISE, "trial": []}

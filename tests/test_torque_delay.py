@@ -8,6 +8,7 @@ import pytest
 from noisy_run import NOISE, noisy_run
 
 import mjchair
+from mjchair import practice
 from mjchair.diagnosis.data.study import make_study
 from mjchair.diagnosis.explain import hypotheses
 from mjchair.diagnosis.explain.fits import Fits
@@ -103,3 +104,10 @@ def test_the_remark_says_which_is_late():
         "40.0 ± 2 ms later than the other columns"
     )
     assert "40.0 ± 2 ms earlier" in said({"delay": -0.04}, {"delay": 0.002})
+
+
+def test_a_practice_study_says_that_its_torques_were_measured():
+    """Of commands no delay is looked for, so that the hidden one was not found."""
+    files = practice.hide(find("torque_delay"))
+    assert 'torque = "measured"' in files["study.toml"]
+    assert "torque =" not in practice.hide(find("toe"))["study.toml"]

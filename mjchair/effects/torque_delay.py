@@ -41,5 +41,6 @@ EFFECT = Effect(
     drive=False,
     instead=("input_timing",),
     recording=True,
+    example={"delay": 0.06},
     remark=_size,
 )
