@@ -39,7 +39,6 @@ EFFECT = Effect(
     driven=True,
     commanded=False,
     drive=False,
-    instead=("input_timing",),
     recording=True,
     example={"delay": 0.06},
     remark=_size,

@@ -22,8 +22,8 @@ def record_late(spec: mujoco.MjSpec, by: float) -> None:
     """Take the torques of both rear wheels as recorded `by` (s) later than they acted, in place."""
     for wheel in parts.REAR:
         actuator = parts.named(spec.actuators, wheel, "actuator")
-        before = list(actuator.userdata)
-        known = before[1] if len(before) >= NUMBERS and before[0] == TAG else 0.0
+        tag, known = (*actuator.userdata, 0.0, 0.0)[:NUMBERS]
+        known = known if tag == TAG else 0.0  # nothing else of mjchair writes in this field
         parts.write_actuator(spec, actuator, [TAG, known + by])
 
 
