@@ -20,7 +20,12 @@ from mjchair.errors import MjchairError
 
 
 def begun(monkeypatch, effect, chi2, other=None):
-    """The size at which a fit of the effect begins; None: none is better than no effect.
+    """The best size at which a fit of the effect begins; None: none is better than no effect."""
+    return next(iter(all_begun(monkeypatch, effect, chi2, other)), None)
+
+
+def all_begun(monkeypatch, effect, chi2, other=None):
+    """The sizes at which fits of the effect begin, best first.
 
     other: chi2 of a fit of other effects.
     """
@@ -43,8 +48,8 @@ def begun(monkeypatch, effect, chi2, other=None):
         bench=SimpleNamespace(windows=np.arange(6)),
     )
     start = SimpleNamespace(effect=effect, free=(parameter.name,))
-    best = whole_sizes._best_size(base, start, parameter, rival)
-    return None if best is None else best.terms[0].values[parameter.name]
+    begins = whole_sizes._best_sizes(base, start, parameter, rival)
+    return [begin.terms[0].values[parameter.name] for begin in begins]
 
 
 @pytest.mark.parametrize("truth", [0.055, 0.083, 0.12])
@@ -55,6 +60,19 @@ def test_a_fit_begins_next_to_the_size_that_is_there(monkeypatch, truth):
         monkeypatch, effect, lambda v: 2000.0 - 1500.0 * math.exp(-(((v - truth) / 0.01) ** 2))
     )
     assert size == pytest.approx(truth, abs=0.008)
+
+
+def test_a_fit_begins_in_each_of_two_valleys(monkeypatch):
+    """Casters shimmied as well at 0.13 m as at 0.08, where 0.09 was hidden, and not at 0.1."""
+
+    def chi2(size):
+        return 2000.0 - sum(
+            deep * math.exp(-(((size - at) / 0.012) ** 2))
+            for at, deep in ((0.087, 1400.0), (0.13, 1300.0))
+        )
+
+    sizes = all_begun(monkeypatch, find("relaxation_length"), chi2)
+    assert sorted(sizes) == pytest.approx([0.087, 0.13], abs=0.006)
 
 
 @pytest.mark.parametrize(("other", "begins"), [(1400.0, True), (200.0, False)])
