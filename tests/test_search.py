@@ -478,6 +478,7 @@ def chosen(hypothesis, tried, own_gains):
     [
         (-1.5e6, 1.5, 1099.5, True),  # around the fit linear algebra says nothing
         (-1.5e6, 0.03, 1099.5, False),  # it is the right one
+        (-1.5e6, 1.5, 1102.6, True),  # the fit has not come to its end
         (-1.5e6, 1.5, 1200.0, False),  # no chair is so
         (510.0, 1.5, 1099.5, False),  # linear algebra has compared them
     ],
