@@ -64,7 +64,7 @@ from mjchair.diagnosis.result import (
     Stages,
 )
 from mjchair.diagnosis.rules import Verdict
-from mjchair.effects.effect import Parameter
+from mjchair.effects.effect import Effect, Parameter
 from mjchair.errors import MjchairError
 
 Array = NDArray[np.float64]
@@ -161,15 +161,7 @@ def _in_one_run(found: InOneRun, gap: Gap) -> OneRun:
             for name in term.free
         }
         closed = min(option.gain / max(gap.excess, option.gain), 1.0)
-        effects.append(
-            NamedEffect(
-                name=term.effect.name,
-                parameters=parameters,
-                closure=closed,
-                channel=term.effect.channel,
-                recording=term.effect.recording,
-            )
-        )
+        effects.append(_found_effect(term.effect, parameters, closed))
     return OneRun(trial=found.trial, effects=tuple(effects), gain=found.gain, others=found.others)
 
 
@@ -354,18 +346,22 @@ def _named(fitted: Fitted, closed: float) -> list[NamedEffect]:
             )
             for p in term.effect.parameters
         }
-        name, channel = term.effect.name, term.effect.channel
-        out.append(
-            NamedEffect(
-                name=name,
-                parameters=parameters,
-                closure=closed,
-                channel=channel,
-                remark=notes.remark(fitted, term),
-                recording=term.effect.recording,
-            )
-        )
+        out.append(_found_effect(term.effect, parameters, closed, notes.remark(fitted, term)))
     return out
+
+
+def _found_effect(
+    effect: Effect, parameters: Mapping[str, Estimate], closed: float, remark: str = ""
+) -> NamedEffect:
+    """An effect of the library with the sizes that were found."""
+    return NamedEffect(
+        name=effect.name,
+        parameters=parameters,
+        closure=closed,
+        channel=effect.channel,
+        remark=remark,
+        recording=effect.recording,
+    )
 
 
 def _candidates(base: Base, gap: Gap, choice: Choice | None) -> list[Candidate]:

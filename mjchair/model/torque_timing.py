@@ -3,7 +3,7 @@
 In: a specification and by how much its torques were recorded late. Out: the same specification,
 with that number in the `user` field of the rear wheels' actuators; and the number again, of a
 compiled model. Nothing in the engine reads it: whoever gives a model its torques over time
-(`Inputs.control_array`) takes each so much earlier than its table says.
+(`Inputs.control_array`) lets each act so much earlier than its table says.
 
 MuJoCo's own delay of an actuator would not do: it can only give a torque later.
 """

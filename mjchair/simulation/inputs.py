@@ -119,7 +119,7 @@ class Inputs(FrozenRecord):
 
         Args:
           model: the model whose actuators are driven. Where it says that torques were recorded late
-            (`torque_delay`), each is taken so much later from its column.
+            (`torque_delay`), each acts so much earlier than its column says.
           time: (n,), s.
 
         Returns:

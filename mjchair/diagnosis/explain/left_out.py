@@ -160,9 +160,8 @@ def _foretold(base: Base, fitted: Fitted, windows: NDArray[np.int64]) -> tuple[f
     """
     count = fitted.system.nuisance
     slow = np.concatenate([fitted.system.slow[int(i)][-1] for i in windows])
-    left, columns = slow[:, 0] - slow[:, 1:] @ fitted.step[:count], slow[:, 1:]
-    told, shown = columns.T @ columns, columns.T @ left
-    return _beside_known(base, fitted, float(left @ left), shown, told), float(left.size)
+    left = slow[:, 0] - slow[:, 1:] @ fitted.step[:count]
+    return _beside_known(base, fitted, left, slow[:, 1:]), float(left.size)
 
 
 def _changed(base: Base, fitted: Fitted, windows: NDArray[np.int64]) -> float:
@@ -176,7 +175,7 @@ def _changed(base: Base, fitted: Fitted, windows: NDArray[np.int64]) -> float:
     known = plain.system.columns[:count]
     columns = [plain.columns[c] for c in known]
     moved = fitted.step[fitted.system.index(known)] - plain.step[:count]
-    chi2, shown, told = 0.0, np.zeros(count), np.zeros((count, count))
+    parts = []
     for i in (int(w) for w in windows):
         by = residual(fitted.track.predicted[i], plain.track.predicted[i], simulator.channels)
         by[np.isnan(simulator.measured(simulator.windows[i]))] = np.nan
@@ -184,22 +183,21 @@ def _changed(base: Base, fitted: Fitted, windows: NDArray[np.int64]) -> float:
         left = eliminate_window(
             simulator, plain.track, bench.whitener, i, by, stacked, bench.process
         )
-        slow = slow_components(left, count, bench.whitener.slow(i, BAND))[-1]
-        change, beside = slow[:, 0] + slow[:, 1:] @ moved, slow[:, 1:]
-        chi2 += float(change @ change)
-        shown, told = shown + beside.T @ change, told + beside.T @ beside
-    return _beside_known(base, plain, chi2, shown, told)
+        parts.append(slow_components(left, count, bench.whitener.slow(i, BAND))[-1])
+    slow = np.concatenate(parts)
+    return _beside_known(base, plain, slow[:, 0] + slow[:, 1:] @ moved, slow[:, 1:])
 
 
-def _beside_known(base: Base, fitted: Fitted, chi2: float, shown: Array, told: Array) -> float:
-    """What is left of chi2 once roughly known numbers did their best, as far as a fit leaves open.
+def _beside_known(base: Base, fitted: Fitted, data: Array, columns: Array) -> float:
+    """Chi2 of data (samples,) beside roughly known numbers, as far as a fit leaves these open.
 
     Args:
-      chi2: of some data. shown: (n,) products of the n roughly known numbers' columns with these
-        data. told: (n, n) of the columns with one another.
+      columns: (samples, n) of the n numbers that are only roughly known.
     """
+    shown, told = columns.T @ data, columns.T @ columns
     spread = bounded.covariance(fitted.system, base.bench.windows)[: shown.size, : shown.size]
-    return float(chi2 - shown @ np.linalg.solve(np.linalg.inv(spread) + told, shown))
+    taken = shown @ np.linalg.solve(np.linalg.inv(spread) + told, shown)
+    return float(data @ data - taken)
 
 
 def slow_part(system: System, windows: NDArray[np.int64]) -> tuple[float, float]:

@@ -47,14 +47,14 @@ def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitte
     Args:
       other: a fit of other effects; a size that misses half of what it brings begins no fit.
     """
+    # where it slides or shimmies, coarse derivatives lead a fit astray
+    touchy = replace(base.around.track, touchy=frozenset(_worst_windows(base)))
     seen = set()
     for start in base.starts:
         p = _parameter(start.effect)
         if p is None or start.effect.key in seen:
             continue
         seen.add(start.effect.key)
-        # where it slides or shimmies, coarse derivatives lead a fit astray
-        touchy = replace(base.around.track, touchy=frozenset(_worst_windows(base)))
         for begin in _best_sizes(base, start, p, other):
             try:
                 yield start, refit(base.bench, begin, touchy)
