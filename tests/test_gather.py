@@ -1,5 +1,6 @@
 """Files of a laboratory with a known motion into a study."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import lab_files as lab
@@ -8,6 +9,8 @@ import pytest
 
 import mjchair
 from mjchair.cli import main
+from mjchair.diagnosis.data.study import without_estimated_torques
+from mjchair.diagnosis.data.study_file import read_study
 from mjchair.errors import MjchairError
 from mjchair.measurement import samples
 from mjchair.measurement.clocks import Signal, align, best_alignment
@@ -395,6 +398,25 @@ def test_without_torque_and_coasts_the_torque_is_estimated_and_it_says_so(tmp_pa
     (trial,) = found.trials
     true = np.interp(trial.time, run[0], run[2].mean(axis=1))
     assert np.corrcoef(trial.columns["left_wheel"], true)[0, 1] > 0.95
+
+
+def test_a_torque_made_from_the_motion_is_no_evidence(tmp_path):
+    """Its diagnosis named camber and a payload of the sprint that the torque was made from."""
+    files = tmp_path / "files"
+    files.mkdir()
+    wheel_sensor(files / "push_left_wheel.csv", lab.motion(20.0, coast=0.2))
+    found = gather(files, Known(mass=92.0, wheel_radius=0.3))
+    for name, text in found.files.items():
+        (tmp_path / name).write_text(text)
+    study = read_study(tmp_path)
+    assert not study.torque_measured
+    with pytest.raises(MjchairError, match="no other trial is left"):
+        without_estimated_torques(study)
+    (run,) = study.runs
+    coast = replace(run, torque_estimated=False)
+    left = without_estimated_torques(replace(study, runs=(coast, run)))
+    assert left.runs == (coast,)
+    assert "left out" in left.notes[-1]
 
 
 def test_a_coast_is_a_coast_and_strokes_are_none(run):

@@ -10,6 +10,7 @@ import argparse
 import json
 import shutil
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from mjchair.diagnosis.data.study import Study
     from mjchair.diagnosis.result import Diagnosis
 
+LOG_EVERY = 20.0  # s between lines of progress in a log
 CACHE = "unfinished"  # simulations of a diagnosis that was interrupted
 TOP = (
     "verdict",
@@ -69,6 +71,7 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 
 def run(args: argparse.Namespace) -> int:
     """Diagnose, write everything, and print the verdict on one line."""
+    from mjchair.diagnosis.data.study import without_estimated_torques
     from mjchair.diagnosis.data.study_file import read_study
     from mjchair.diagnosis.diagnose import diagnose
     from mjchair.diagnosis.replay.cache import Store
@@ -78,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
     kept = Path(args.out) / CACHE
     force = args.force or _interrupted(kept)
     check_vacant(args.out, force)
-    study = read_study(args.study)
+    study = without_estimated_torques(read_study(args.study))
     effects = [user_file.from_file(path) for path in args.effect]
     for effect in effects:
         user_file.check(effect, study.spec)
@@ -107,15 +110,21 @@ def run(args: argparse.Namespace) -> int:
 
 @contextmanager
 def _progress() -> Iterator[Callable[[str], None]]:
-    """What to call as a stage begins; shown on a terminal only."""
+    """What to call as a stage begins: a bar on a terminal, elsewhere a line now and then."""
     from tqdm import tqdm
 
     layout = "{elapsed} {n_fmt} stages{postfix}"
     with tqdm(unit="stage", disable=None, bar_format=layout) as bar:
+        begun = told = time.monotonic()
 
         def say(stage: str) -> None:
+            nonlocal told
             bar.set_postfix_str(stage)
             bar.update()
+            now = time.monotonic()
+            if bar.disable and now - told > LOG_EVERY:
+                told = now
+                print(f"mjchair: {now - begun:.0f} s, {stage}", file=sys.stderr, flush=True)
 
         yield say
 

@@ -88,7 +88,8 @@ def run(args: argparse.Namespace) -> int:
         f"wrote {args.out}/study.toml, {len(gathered.trials)} trials; look at "
         f"{args.out}/{PICTURE}, details are in {args.out}/{LOG}"
     )
-    print(f"next: mjchair diagnose {args.out}")
+    first = "add a coast, then " if all(t.torque_estimated for t in gathered.trials) else ""
+    print(f"next: {first}mjchair diagnose {args.out}")
     return 0
 
 

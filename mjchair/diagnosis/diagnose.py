@@ -12,7 +12,7 @@ from dataclasses import replace
 import mujoco
 
 from mjchair.diagnosis.data.roughly_known import mistaken
-from mjchair.diagnosis.data.study import Study
+from mjchair.diagnosis.data.study import Study, without_estimated_torques
 from mjchair.diagnosis.data.study_file import read_study
 from mjchair.diagnosis.decide import conclude
 from mjchair.diagnosis.explain.fits import Fits
@@ -73,7 +73,8 @@ def diagnose(
     Raises:
       MjchairError: a study that cannot be read or simulated, as one line.
     """
-    known = study if isinstance(study, Study) else read_study(study)
+    told = study if isinstance(study, Study) else read_study(study)
+    known = without_estimated_torques(told)
     # threads cost the linear algebra more than they bring on matrices this small
     from threadpoolctl import threadpool_limits  # sets an environment variable when imported
 

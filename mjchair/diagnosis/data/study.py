@@ -32,6 +32,7 @@ class Run:
       hold_out: kept for the final check. initial: what is known of the first sample; fields that
         were not given are estimated. given: names of the fields that were given.
       load: that was strapped to the chair for this run; None: none.
+      torque_estimated: whether its torques were made from its motion.
     """
 
     trial: Trial
@@ -40,6 +41,7 @@ class Run:
     initial: Initial
     given: frozenset[str]
     load: Load | None = None
+    torque_estimated: bool = False
 
     @property
     def duration(self) -> float:
@@ -147,6 +149,28 @@ def make_study(
         notes=tuple(said),
         source=source,
     )
+
+
+def without_estimated_torques(study: Study) -> Study:
+    """The study without the runs whose torques were made from their motion, and a note on them.
+
+    Such a torque explains its run whatever the chair lacks, and with a rolling resistance that was
+    assumed: its run speaks for effects that are not there.
+
+    Raises:
+      MjchairError: no run is left to fit to.
+    """
+    left = tuple(run for run in study.runs if not run.torque_estimated)
+    if len(left) == len(study.runs):
+        return study
+    names = ", ".join(run.trial.name for run in study.runs if run.torque_estimated)
+    said = f'torque = "estimated": the motion of {names} made its torque, and cannot contradict it'
+    if all(run.hold_out for run in left):
+        raise MjchairError(
+            f"{study.source}: {said}; no other trial is left to fit to: add a coast, or a run with "
+            "its torque measured"
+        )
+    return replace(study, runs=left, notes=(*study.notes, f"{said}; left out"))
 
 
 def with_copied_wheels(study: Study) -> Study:

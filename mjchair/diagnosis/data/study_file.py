@@ -81,6 +81,7 @@ class TrialEntry(Struct, forbid_unknown_fields=True):
     baseline: str | None = None
     inputs: str | None = None
     load: LoadEntry | None = None
+    torque: Literal["estimated"] | None = None
 
 
 class ProcessEntry(Struct, forbid_unknown_fields=True):
@@ -263,8 +264,16 @@ def _runs(entry: StudyEntry, path: Path, model: mujoco.MjModel) -> list[Run]:
         given = told.initial.given(trial.name) if told.initial is not None else {}
         unit_checks.check_initial(given, trial.name)
         load = None if told.load is None else Load(**structs.asdict(told.load))
-        initial = Initial(**given)
-        runs.append(Run(trial, told.manoeuvre, told.hold_out, initial, frozenset(given), load))
+        run = Run(
+            trial,
+            told.manoeuvre,
+            told.hold_out,
+            Initial(**given),
+            frozenset(given),
+            load,
+            told.torque is not None,
+        )
+        runs.append(run)
     return runs
 
 

@@ -45,7 +45,8 @@ class GatheredTrial:
       manoeuvre: a word. alignments: file -> how its clock was put on the reference.
       instruments: on the reference's clock, for the picture. notes: one line each. begin: the
         reference's time at time zero of the table, s. heading: rad, at the first row, in the axes
-        of all trials; None: nothing tells it.
+        of all trials; None: nothing tells it. torque_estimated: whether the torque among the
+        columns was made from the motion.
     """
 
     name: str
@@ -57,6 +58,7 @@ class GatheredTrial:
     notes: tuple[str, ...] = ()
     begin: float = 0.0
     heading: float | None = None
+    torque_estimated: bool = False
 
     @property
     def driven(self) -> bool:

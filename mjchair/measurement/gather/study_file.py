@@ -33,7 +33,7 @@ def study_text(
     out = ["# Made by `mjchair gather`; every line may be changed by hand. Units are SI."]
     out += [_line('model = "manual"', "the chair that is to explain these runs, or a path to MJCF")]
     out += _rider(trials)
-    if any(trial.driven for trial in trials):
+    if any(trial.driven and not trial.torque_estimated for trial in trials):
         out += [_line('torque = "measured"', "at the push rims; commanded: by a motor")]
     out += _floor(known)
     out += ["", "# What the person who measured knows, and no instrument on the chair can tell"]
@@ -133,9 +133,10 @@ def unit_of(channel: str) -> str:
 
 def _held_out(trials: Sequence[GatheredTrial]) -> GatheredTrial | None:
     """The trial that is kept for the final check: the last push, or coast, of three or more."""
+    telling = [trial for trial in trials if not trial.torque_estimated]
     for word in ("push", "coast"):
-        mine = [trial for trial in trials if trial.manoeuvre == word]
-        if len(mine) >= ENOUGH or (len(mine) == 2 and len(trials) > 2):
+        mine = [trial for trial in telling if trial.manoeuvre == word]
+        if len(mine) >= ENOUGH or (len(mine) == 2 and len(telling) > 2):
             return mine[-1]
     return None
 
@@ -148,6 +149,8 @@ def _trial(trial: GatheredTrial, held_out: bool) -> list[str]:
     out.append(_line(f'manoeuvre = "{trial.manoeuvre}"', f"{word}; runs of one word are compared"))
     kept = "kept for the final check" if held_out else "used to fit"
     out.append(_line(f"hold_out = {'true' if held_out else 'false'}", f"{kept}; keep at least one"))
+    if trial.torque_estimated:
+        out.append(_line('torque = "estimated"', "from the motion; a diagnosis leaves it out"))
     for name, found in trial.alignments.items():
         out.append(f"# clock of {name}: {found.text()}")
     if trial.heading is not None:

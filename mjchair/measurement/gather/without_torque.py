@@ -3,7 +3,7 @@
 In: the trial and the speed of a wheel. Out: the trial with a torque on both wheels. The torque is
 what a rigid chair needs to move as measured: mass times acceleration plus rolling resistance, times
 radius, a half on each wheel. Such a torque explains the motion that it comes from, whatever is
-missing in the chair; what it can still show is what two channels say differently.
+missing in the chair: the run can be simulated with it, and tells a diagnosis nothing.
 """
 
 from __future__ import annotations
@@ -45,7 +45,9 @@ def estimated(trial: GatheredTrial, motion: Instrument, known: Known) -> Gathere
     said = (
         f"{trial.name}: no torque was measured, and no part of 1.5 s rolls freely; the torque is "
         f"estimated from the motion of {motion.name} with {mass:g} kg and {radius:.3f} m, rolling "
-        f"resistance {ROLLING:g}. It explains that motion by construction: add a coast to the study"
+        f"resistance {ROLLING:g}. It explains that motion by construction, so that a diagnosis "
+        "leaves the trial out: add a coast to the study"
     )
     columns = {"left_wheel": torque, "right_wheel": torque, **trial.columns}
-    return replace(trial, columns=columns, manoeuvre="push", notes=(*trial.notes, said))
+    notes = (*trial.notes, said)
+    return replace(trial, columns=columns, manoeuvre="push", notes=notes, torque_estimated=True)
