@@ -320,3 +320,15 @@ def test_a_centre_of_mass_aside_is_no_torque_of_the_other_sign(more, refused, tm
     write(tmp_path / "study", columns)
     with pytest.raises(MjchairError, match="swapped") if refused else nullcontext():
         read_study(tmp_path / "study")
+
+
+@pytest.mark.parametrize("sides", [("left", "right"), ("left",), ("right",)])
+def test_a_slalom_at_an_even_speed_says_nothing_of_an_accelerometer(sides, tmp_path):
+    """What an accelerometer ahead of the axle feels went against the left wheel: was refused."""
+    swing, away = np.sin(2.0 * np.pi * TIME), {"left": -1.0, "right": 1.0}
+    columns = {f"{s}_wheel_speed": (1.0 + 0.2 * away[s] * swing) / 0.3 for s in sides}
+    columns |= {"imu_gyro.z": 0.4 / 0.56 * swing}
+    for sign in (-1.0, 1.0):
+        felt = {"imu_accelerometer.x": sign * 0.12 * np.cos(2.0 * np.pi * TIME)}
+        write(tmp_path / f"study{sign:g}", columns | felt)
+        read_study(tmp_path / f"study{sign:g}")

@@ -70,7 +70,8 @@ def test_json_has_the_keys_of_its_contract(done):
     for candidate in found["candidates"]:
         assert set(candidate) | {"channel"} == set(CANDIDATE)
     for effect in found["effects"]:
-        assert {"name", "parameters", "closure"} <= set(effect)
+        assert {"name", "parameters", "closure", "probability"} <= set(effect)
+        assert found["verdict"] != "named" or effect["probability"] >= 0.95
         for parameter in effect["parameters"].values():
             assert set(parameter) == {"value", "std", "unit"}
     for cell in found["where"]:

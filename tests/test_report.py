@@ -311,6 +311,10 @@ def test_what_is_named_beside_more_that_is_missing_is_no_last_word():
     )
     assert "look for what is left" in words.next_step(found)
     assert "of the gap, and a remainder is left. The chair lacks" in words.missing(found)
+    found.gap = dataclasses.replace(found.gap, scope="held-out trials")
+    falls = "of the gap in the runs of the fit (from 3.0 to 0.9 times the noise in those held out)"
+    assert f"{falls}, and a remainder is left. " in words.missing(found)
+    found.gap = dataclasses.replace(found.gap, scope="")
     found.correction = Variant((), {"mass": -3.0, "centre_x": 2.0})
     said = "gap only with the mass of chair and person together as far from what the study says "
     assert said + "as is believed. The chair" in words.missing(found)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from mjchair.diagnosis.explain.choice import Choice
 from mjchair.diagnosis.explain.column_ids import Driver, Quantity
 from mjchair.diagnosis.explain.gap import Gap
+from mjchair.diagnosis.explain.probability import of_effects
 from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.next_experiment.design import Plan
@@ -386,11 +387,15 @@ class Diagnosis:
     evidence: Evidence | None = field(default=None, repr=False)
     stages: Stages | None = field(default=None, repr=False)
 
+    def _likely(self, effect: NamedEffect) -> float:
+        """How probable it is that an effect is there, alone or with others."""
+        return round(of_effects(self.probability, [effect.key]), 4)
+
     def to_dict(self) -> dict[str, Any]:
         """As in diagnosis.json."""
         return {
             "verdict": str(self.verdict),
-            "effects": [e.to_dict() for e in self.effects],
+            "effects": [{**e.to_dict(), "probability": self._likely(e)} for e in self.effects],
             "alternatives": self.alternatives,
             "candidates": [c.to_dict() for c in self.candidates],
             "gap": asdict(self.gap) if self.gap else {},

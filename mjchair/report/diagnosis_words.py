@@ -178,8 +178,17 @@ def remainder_words(diagnosis: Diagnosis) -> str:
     only = f" only with {ends} as far from what the study says as is believed" if ends else ""
     after = diagnosis.gap.after if diagnosis.gap else None
     left = f", and a remainder is left{goes}" if not ends or after is None or after > 1.0 else ""
-    explains = f"that explains {closed:.0%} of the gap{only}{left}"
+    explains = f"that explains {closed:.0%} of the gap{_held_out(diagnosis)}{only}{left}"
     return f"More is missing than what is named here: {explains}. "
+
+
+def _held_out(diagnosis: Diagnosis) -> str:
+    """How the gap falls on runs that no fit saw; empty: there are none."""
+    gap = diagnosis.gap
+    if gap is None or gap.after is None or "held-out" not in gap.scope:
+        return ""
+    fell = f"from {gap.before:.1f} to {gap.after:.1f} times the noise"
+    return f" in the runs of the fit ({fell} in those held out)"
 
 
 def _at_their_ends(diagnosis: Diagnosis) -> str:

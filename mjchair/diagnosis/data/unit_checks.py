@@ -293,17 +293,16 @@ def _article(name: str) -> str:
 
 
 def _compare_with_acceleration(trial: Trial, axle: RearAxle) -> None:
-    """A wheel's speed must change as the accelerometer says, but for what a slope does to it."""
+    """The wheels' speed must change as the accelerometer says, but for what a slope does to it."""
     name = "imu_accelerometer.x"
     speeds = _speeds(trial)
     if name not in trial.channels or not speeds:
         return
     pull = _mean(trial, name)
-    seen = _mean(trial, speeds[0], axle.radius(speeds[0].split("_")[0]))
-    if pull.time.size < 8 or seen.time.size < 8:
+    if pull.time.size < 8 or _mean(trial, speeds[0]).time.size < 8:
         return
     gained = cumulative_trapezoid(pull.values, pull.time, initial=0.0)
-    speed = at(seen, pull.time)
+    speed = _rolled(trial, axle, pull.time)
     ramp = np.column_stack([np.ones(pull.time.size), pull.time])  # a slope's part, and a bias'
     speed, gained = (v - ramp @ np.linalg.lstsq(ramp, v, rcond=None)[0] for v in (speed, gained))
     sizes = np.linalg.norm(speed), np.linalg.norm(gained)
@@ -316,8 +315,9 @@ def _compare_with_acceleration(trial: Trial, axle: RearAxle) -> None:
     if sizes[0] < PULL * np.sqrt(speed.size) or abs(alike) < ALIKE:
         return
     if alike < 0.0:
-        _refuse_backward(trial, name, speeds, axle)
-        return
+        raise MjchairError(
+            f"{trial.name}: {name} falls where {speeds[0]} rises: x is forward, so turn its sign"
+        )
     why = f"its speed changes {ratio:.1f} times as the accelerometer says"
     if DEGREES / NEAR < ratio < DEGREES * NEAR:
         _refuse(trial, speeds[0], "degrees", why, "deg/s")
@@ -325,13 +325,11 @@ def _compare_with_acceleration(trial: Trial, axle: RearAxle) -> None:
         _refuse(trial, name, "g", f"the wheels gain {ratio:.1f} times the speed that it tells", "g")
 
 
-def _refuse_backward(trial: Trial, name: str, speeds: list[str], axle: RearAxle) -> None:
-    """Refuse an accelerometer that points backward, unless the chair may turn on the spot."""
-    rolled = [_mean(trial, speed, axle.radius(speed.split("_")[0])) for speed in speeds]
-    grid = rolled[0].time
-    both = np.array([at(story, grid) for story in rolled])
-    turns = np.ptp(both, axis=0).max() if len(rolled) > 1 else 0.0
-    if turns < 0.5 * np.abs(both).max():  # the wheels roll alike, and nothing else accelerates
-        raise MjchairError(
-            f"{trial.name}: {name} falls where {speeds[0]} rises: x is forward, so turn its sign"
-        )
+def _rolled(trial: Trial, axle: RearAxle, time: Array) -> Array:
+    """Speed of the axle's middle by the wheels, (n,), m/s; by one alone, less the chair's turn."""
+    sides = [name.split("_")[0] for name in _speeds(trial)]
+    rolled = [at(_mean(trial, f"{side}_wheel_speed", axle.radius(side)), time) for side in sides]
+    if len(sides) > 1 or "imu_gyro.z" not in trial.channels:
+        return np.asarray(np.mean(rolled, axis=0))
+    turn = at(_mean(trial, "imu_gyro.z"), time)
+    return rolled[0] + (0.5 if sides[0] == "left" else -0.5) * axle.track * turn
