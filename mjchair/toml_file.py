@@ -67,9 +67,7 @@ def checked(table: Mapping[str, Any], schema: type[Schema], source: str = "") ->
     if missing:
         line = f"{_name(steps) or 'the file'} has no {missing['name']!r}"
     elif unknown:
-        inside = f" in {steps[-1]}" if steps and isinstance(steps[-1], str) else ""
-        known = _fields(schema, steps)
-        line = f"unknown key {unknown['name']!r}{inside}" + nearest(unknown["name"], known)
+        line = _unknown(unknown["name"], schema, steps)
     else:
         line = _wrong_value(table, schema, steps, said)
     raise MjchairError(f"{source}: {line}" if source else line)
@@ -82,6 +80,16 @@ def _steps(path: str) -> Iterator[str | int | None]:
             yield step["field"]
         else:
             yield None if step["index"] == "..." else int(step["index"])
+
+
+def _unknown(key: str, schema: type[Schema], steps: list[str | int | None]) -> str:
+    """A line on a key that may not stand where it does."""
+    inside = ""
+    if steps:
+        inside = f" in {steps[-1]}" if isinstance(steps[-1], str) else f" in a [[{steps[-2]}]]"
+    if steps and key in _fields(schema, []):
+        return f"key {key!r}{inside} stands at the top of the file, before the first table"
+    return f"unknown key {key!r}{inside}" + nearest(key, _fields(schema, steps))
 
 
 def _wrong_value(

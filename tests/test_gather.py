@@ -535,7 +535,7 @@ BAD = {
     "no such file": (["{good}", "--offset", "imu.csv=3"], "--offset imu.csv: no such file"),
     "no offset": (["{good}", "--offset", "3"], "is not FILE=SECONDS"),
     "no mapping": (["{good}", "--mapping", "none.toml"], "cannot read none.toml"),
-    "wrong plan": (["{plan}"], "unknown key 'sides'; did you mean 'side'?"),
+    "wrong plan": (["{plan}"], "unknown key 'sides' in a [[files]]; did you mean 'side'?"),
     "both left": (["{twice}"], "are both of the left wheel"),
     "one row": (["{row}"], "run.csv is not used: 1 row of numbers; a motion takes at least 3"),
     "torque in N mm": (["{milli}"], "run.csv: left_wheel looks like N mm: it reaches "),

@@ -37,7 +37,11 @@ def test_a_right_table_is_a_struct_with_its_defaults():
     ("table", "line"),
     [
         ({"modell": 1}, "unknown key 'modell'; did you mean 'model'"),
-        ({"trial": [{"file": "a", "hel": 1}]}, "unknown key 'hel'; did you mean 'held'"),
+        (
+            {"trial": [{"file": "a", "hel": 1}]},
+            "unknown key 'hel' in a [[trial]]; did you mean 'held'",
+        ),
+        ({"trial": [{"model": "m"}]}, "key 'model' in a [[trial]] stands at the top of the file"),
         (
             {"trial": [{"file": "a", "start": {"heding": 1}}]},
             "unknown key 'heding' in start; did you mean 'heading'",
