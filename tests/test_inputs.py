@@ -133,6 +133,10 @@ def test_inputs_are_frozen():
     [
         ("time,left_wheel\n0,1\n1,1\n0.5,1\n", "time goes from 1 to 0.5 s in sample 3"),
         ("time,left_wheel\n0,1\n0,1\n", "must increase strictly"),
+        (
+            "time,left_wheel\n0,1\n0,1\n0.01,1\n0.01,1\n0.02,1\n",
+            "if the samples came evenly, k / 200 s for sample k",
+        ),
         ("time,left_wheel\n0,1\n,1\n", "every sample needs a time"),
         ("time,left_wheel\n0,nan\n", "leave the cell of a missing sample empty"),
         ("time,left_wheel\n0,inf\n", "infinite at 0 s"),

@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 # a time column without a unit that has more samples and longer steps seems to be in milliseconds
 MANY, LONG_STEP = 20, 1.0  # samples, s
 SAME = 1e-5  # s, within which samples of two tables are of one time
+SHARED = 0.1  # of samples with the time of the one before, from which times were rounded
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,8 +106,20 @@ def check_time(time: Array, source: str) -> None:
         row = back[0] + 1
         raise MjchairError(
             f"{source}: time goes from {time[row - 1]:.12g} to {time[row]:.12g} s in sample "
-            f"{row + 1}; it must increase strictly"
+            f"{row + 1}; it must increase strictly" + _rounded(time)
         )
+
+
+def _rounded(time: Array) -> str:
+    """Advice where samples share their times, as rounded ones do; empty: nothing tells that."""
+    steps = np.diff(time)
+    if np.any(steps < 0.0) or time[-1] == time[0] or np.mean(steps == 0.0) < SHARED:
+        return ""
+    rate = steps.size / (time[-1] - time[0])
+    return (
+        f". {np.sum(steps == 0.0)} samples share the time of the one before, as rounded times do; "
+        f"write more digits, or, if the samples came evenly, k / {rate:.4g} s for sample k"
+    )
 
 
 def read_table(path: str | os.PathLike[str]) -> Table:
