@@ -584,3 +584,11 @@ def test_what_harmonics_say_together_stands_in_place_of_six_numbers():
     html = page(found, {})
     first = html[: html.index("What to do next")]
     assert said in first and "-0.069" not in first
+
+
+def test_what_a_person_does_that_nothing_shows_is_told_where_it_counts():
+    levels = {"drive": Estimate(value=2.0, std=None, unit="N")}
+    for left, told in ((0.004, False), (0.2, True)):
+        levels["person"] = Estimate(value=left, std=None, unit="1")
+        said = words.process_words(Diagnosis(verdict=Verdict.NONE, process=levels))
+        assert ("20 % of the force by which the person moves" in said) == told

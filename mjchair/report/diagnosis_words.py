@@ -35,6 +35,7 @@ TURNS = {"wheel_turn": str(Part.WHEEL_TURN), "caster_turn": str(Part.CASTER_TURN
 CLEAR = 0.5  # of what shakes the chair forward: a force once a turn of this size is told
 NOTABLE = 1.5  # times the noise: where a correction leaves more, what can explain it is said
 A_GAP = 0.8  # of what a correction leaves: where no more than this is a gap, the rest is explained
+LITTLE = 0.01  # of a person's force: less is not told
 FAINT = 1e-3  # of the loudest: less of what shakes a chair is nothing
 MUCH = 0.15  # share by which a fit moved what a person can measure, worth a word beside a name
 ALIKE = 3  # effects in one run alone that a sentence names
@@ -230,13 +231,13 @@ def _clear_turns(diagnosis: Diagnosis) -> dict[str, tuple[str, Estimate]]:
 
 
 def _person_words(diagnosis: Diagnosis) -> str:
-    """How much of a moving person's force is in no model; nothing where nobody moves."""
-    share_left = diagnosis.process.get("person")
-    if share_left is None:
+    """How much of a moving person's force is in no model; nothing where that is too little."""
+    left = diagnosis.process.get("person")
+    if left is None or left.value < LITTLE:
         return ""
     return (
-        f"A person moves on the chair, and {share(share_left.value)} of that person's force is in "
-        "no measured motion and no two strokes alike. "
+        f"To that comes {share(left.value)} of the force by which the person moves: no sensor "
+        "shows this part, and it differs from stroke to stroke. "
     )
 
 
