@@ -86,14 +86,14 @@ class Manoeuvre:
 def manoeuvres() -> list[Manoeuvre]:
     """The runs of a practice study.
 
-    Together they tell apart what looks alike in a coast: a fast one shows air, one each way a
-    slope, a turn on the spot toe, and a load the bearings, which do not feel it.
+    Together they tell apart what looks alike in a coast: a fast one shows air, a fast one each way
+    a slope or a wind, a turn on the spot toe, and a load the bearings, which do not feel it.
     """
     strokes = push_strokes({"left_wheel": 12.0, "right_wheel": 12.0}, SECONDS)
-    there, back = ({"heading": h, "position": (x, 0.0)} for h, x in ((0.0, 0.0), (np.pi, 6.0)))
+    there, back = ({"heading": h, "position": (x, 0.0)} for h, x in ((0.0, 0.0), (np.pi, 14.0)))
     return [
         Manoeuvre("coast", {"speed": 3.4, **there}),
-        Manoeuvre("coast", {"speed": 1.4, **back}, load=LOAD),
+        Manoeuvre("coast", {"speed": 2.8, **back}, load=LOAD),
         Manoeuvre("turn", {"speed": 1.0, "heading": 0.5, "yaw_rate": 0.6}, _turn()),
         Manoeuvre("push", {"speed": 0.8, "heading": 1.2}, strokes),
         Manoeuvre("slalom", {"speed": 1.0, "heading": -0.6}, _slalom(), LOAD),

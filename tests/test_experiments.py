@@ -75,6 +75,18 @@ def test_a_slope_is_told_from_rolling_by_another_heading(against_slope):
     assert against_slope.best.least > 9.0
 
 
+def test_a_wind_is_told_from_drag_by_a_fast_coast_the_other_way(one_way):
+    """A coast back from 1.8 m/s would have had to be repeated 19 times."""
+    _, _, bench, (rolling, _, _) = one_way
+    air = fitted(bench, rolling.track, "air_drag", ("drag_area",))
+    term = Term(find("wind"), {"x": -0.5, "y": 0.0, "drag_area": 0.9}, ("x", "y"))
+    wind = refit(bench, Variant(bench.nuisances, {}, (term,)), rolling.track, rounds=3)
+    few = [BY_NAME["coast reversed"], BY_NAME["fast coast reversed"]]
+    found = design.plan(bench, air, [wind], few, doubts=())
+    least = {e.manoeuvre.name: e.least for e in found.experiments}
+    assert least["fast coast reversed"] > 2.0 * least["coast reversed"]
+
+
 def test_what_is_promised_is_what_the_experiment_gives(one_way, against_slope):
     rng, runs, bench, (rolling, slope, _) = one_way
     best = against_slope.best
@@ -262,9 +274,9 @@ def test_with_one_wheel_measured_nothing_that_turns_is_asked_for():
     """The other wheel is taken to roll alike, which a spin on the spot does not."""
     asked = {m.name for m in possible(Setting((0.0, 0.0), 0.0, 10.0, straight=True))}
     assert asked == {
-        "stand", "coast", "coast reversed", "coast across", "fast coast", "slow coast",
-        "coast backwards", "coast a metre aside", "pushes", "short steps", "long steps",
-        "loaded coast",
+        "stand", "coast", "coast reversed", "coast across", "fast coast", "fast coast reversed",
+        "slow coast", "coast backwards", "coast a metre aside", "pushes", "short steps",
+        "long steps", "loaded coast",
     }  # fmt: skip
     assert len({m.name for m in LIBRARY}) == len(LIBRARY)
 

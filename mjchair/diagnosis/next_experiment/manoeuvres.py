@@ -186,6 +186,14 @@ LIBRARY = (  # simplest first
         0.5 * np.pi,
     ),
     Manoeuvre("fast coast", "Coast from 3 m/s", 3.0),
+    Manoeuvre(
+        "fast coast reversed",
+        "Coast the other way over the same floor: start 14 m further ahead, heading turned by 180 "
+        "degrees, from 3 m/s",
+        3.0,
+        np.pi,
+        shift=(14.0, 0.0),
+    ),
     Manoeuvre("slow coast", "Coast from 0.8 m/s", 0.8),
     Manoeuvre("coast backwards", "Coast backwards from 0.5 m/s", -0.5, seconds=4.0),
     Manoeuvre(
