@@ -35,7 +35,7 @@ from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.pulses import pulse_answers, pulses
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.diagnosis.replay.window_states import Track, track
-from mjchair.effects.effect import Effect
+from mjchair.effects.effect import Effect, SensorError
 from mjchair.errors import MjchairError
 
 Say = Callable[[str], None]
@@ -86,8 +86,13 @@ class Base:
 
     @cached_property
     def acting_alone(self) -> ActingIn | None:
-        """The run in which one effect alone brings most, by linear algebra; None: none does."""
-        return best_run(self.system, self.bench.windows, self.starts)
+        """The run in which one effect alone brings most, by linear algebra; None: none does.
+
+        The gain of a sensor is the same in every run. Where a caster turned over to the other side,
+        a gain of its angle is as well what linear algebra makes of that.
+        """
+        lasting = [s for s in self.starts if s.effect.sensor is not SensorError.SCALE]
+        return best_run(self.system, self.bench.windows, lasting)
 
 
 def silent(_: str) -> None:
