@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mjchair.diagnosis import decide, notes, rules
-from mjchair.diagnosis.explain import event, one_run
+from mjchair.diagnosis.explain import event, one_run, screening
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.column_ids import EffectColumn, EffectGroup
 from mjchair.diagnosis.explain.hypotheses import weigh
@@ -16,6 +16,7 @@ from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import RoughlyKnown
 from mjchair.diagnosis.fit.system import System
 from mjchair.effects.effect import Effect, Parameter
+from mjchair.effects.sensors import sensor_effects
 
 RUNS, WINDOWS, ROWS = ("east", "west", "slalom"), 4, 80
 STEP = 2.0  # N, of which a column is the answer
@@ -181,3 +182,16 @@ def test_the_report_says_which_run_differs_and_by_what():
         f"west differs from the other runs: drag in it alone lowers chi2 by {found.gain:.0f} with "
         f"1 number, drag in all runs by {found.others:.0f}"
     )
+
+
+def test_the_gain_of_a_sensor_is_no_rival_in_one_run(monkeypatch):
+    """It took the place of a smaller wheel where a caster had turned over to the other side."""
+    looked = []
+    monkeypatch.setattr(
+        screening, "best_run", lambda system, windows, starts: looked.extend(starts)
+    )
+    starts = [SimpleNamespace(effect=e) for e in sensor_effects("left_caster_angle")]
+    bench = SimpleNamespace(windows=None)
+    base = SimpleNamespace(system=None, bench=bench, starts=starts)
+    screening.Base.acting_alone.func(base)
+    assert [s.effect.name for s in looked] == ["sensor_bias", "sensor_delay"]

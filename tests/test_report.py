@@ -11,8 +11,10 @@ import pytest
 from figure_layout import assert_legible
 
 from mjchair.diagnosis import notes
+from mjchair.diagnosis.data.roughly_known import Nuisance
 from mjchair.diagnosis.explain.column_ids import Driver, Quantity
 from mjchair.diagnosis.explain.missing_force import Products, mean_forces
+from mjchair.diagnosis.fit.column_ids import RoughlyKnown
 from mjchair.diagnosis.fit.variant import Variant
 from mjchair.diagnosis.replay.pulses import Force, Pulse
 from mjchair.diagnosis.result import (
@@ -34,6 +36,7 @@ from mjchair.diagnosis.result import (
     WindowGaps,
 )
 from mjchair.diagnosis.rules import Verdict
+from mjchair.effects.effect import SensorError
 from mjchair.report import diagnosis_words as words
 from mjchair.report.diagnosis_figures import (
     candidates,
@@ -213,10 +216,21 @@ def test_noise_that_is_larger_than_the_study_says_is_told():
     noise = {c: SimpleNamespace(total=v, source="study.toml") for c, v in of.items()}
     study = SimpleNamespace(notes=[], unplaced=(), copied=(), noise={"a": 0.0005, "b": 0.0041})
     bench = SimpleNamespace(simulator=SimpleNamespace(study=study), noise=noise)
-    base = SimpleNamespace(bench=bench, dropped=[])
+    gains = [
+        Nuisance(f"scale:{c}", 0.01, "1", None, c, SensorError.SCALE) for c in ("fine", "faulty")
+    ]
+    places = {RoughlyKnown(n.name): k for k, n in enumerate(gains)}
+    plain = SimpleNamespace(
+        variant=SimpleNamespace(nuisances=gains),
+        system=SimpleNamespace(places=places),
+        step=[1.0, -2.8],
+    )
+    base = SimpleNamespace(bench=bench, dropped=[], plain=plain)
     said = notes.notes_on(base, None, None, None, said=Verdict.NONE, left=[], alone=None)
-    assert [line.split(":")[0] for line in said] == ["noise of a", "noise of c"]
+    assert [line.split(":")[0] for line in said[:2]] == ["noise of a", "noise of c"]
     assert "0.0046 (SI) is left by the best fit, and not the 0.0005" in said[0]
+    assert said[2].startswith("faulty shows 2.8 % too little by these runs")
+    assert len(said) == 3
 
 
 def test_what_acts_in_one_run_alone_is_said_with_the_run_and_the_sizes():
@@ -252,7 +266,10 @@ def test_one_run_is_not_called_several():
 
 def test_a_named_effect_comes_with_value_and_uncertainty():
     said = words.missing(Diagnosis(verdict=Verdict.NAMED, effects=[ROLLING]))
-    assert said == "The chair lacks **rolling resistance** (coefficient 0.01460 ± 0.00040)."
+    assert (
+        said
+        == "The model of the chair lacks **rolling resistance** (coefficient 0.01460 ± 0.00040)."
+    )
 
 
 def test_what_a_correction_leaves_is_told_apart_from_what_is_only_roughly_known():
@@ -297,7 +314,7 @@ def test_a_sensor_at_fault_is_no_lack_of_the_chair(name, parameter, value, unit,
     assert words.missing(alone) == "The torques came late (**torque delay**)."
     assert words.next_step(alone).endswith("correct what was recorded; the chair lacks nothing.")
     both = Diagnosis(verdict=Verdict.NAMED, effects=[fault, ROLLING])
-    assert "The chair lacks **rolling resistance** (" in words.missing(both)
+    assert "The model of the chair lacks **rolling resistance** (" in words.missing(both)
     assert f"), and the sensor of heading {said}" in words.missing(both)
     assert "model.xml" in words.next_step(both)
 
@@ -310,16 +327,18 @@ def test_what_is_named_beside_more_that_is_missing_is_no_last_word():
         more_missing=True,
     )
     assert "look for what is left" in words.next_step(found)
-    assert "of the gap, and a remainder is left. The chair lacks" in words.missing(found)
+    assert "of the gap, and a remainder is left. The model of the chair lacks" in words.missing(
+        found
+    )
     found.gap = dataclasses.replace(found.gap, scope="held-out trials")
     falls = "of the gap in the runs of the fit (from 3.0 to 0.9 times the noise in those held out)"
     assert f"{falls}, and a remainder is left. " in words.missing(found)
     found.gap = dataclasses.replace(found.gap, scope="")
     found.correction = Variant((), {"mass": -3.0, "centre_x": 2.0})
     said = "gap only with the mass of chair and person together as far from what the study says "
-    assert said + "as is believed. The chair" in words.missing(found)
+    assert said + "as is believed. The model" in words.missing(found)
     found.gap = dataclasses.replace(found.gap, after=1.3)
-    assert "as is believed, and a remainder is left. The chair" in words.missing(found)
+    assert "as is believed, and a remainder is left. The model" in words.missing(found)
 
 
 def test_how_probable_a_lone_effect_is_stands_in_the_first_sentence():
@@ -329,7 +348,7 @@ def test_how_probable_a_lone_effect_is_stands_in_the_first_sentence():
         probability={"rolling_resistance": 0.8, "rolling_resistance+toe": 0.07, "none": 0.13},
     )
     said = words.missing(found)
-    assert said.startswith("Probably (87%), the chair lacks **rolling resistance** (")
+    assert said.startswith("Probably (87%), the model of the chair lacks **rolling resistance** (")
     assert said.endswith("; these runs are not enough to name it.")
     found.probability = {"rolling_resistance": 0.4, "outside": 0.6}
     assert "the evidence is thin" in words.missing(found)

@@ -953,6 +953,35 @@ def test_a_rival_of_one_effect_is_weighed_against_what_that_effect_brings(
     assert near == {"rolling": False, "motor": True}  # around the fit: of the one that brings less
 
 
+@pytest.mark.parametrize("overstated", [0.0, 900.0])
+def test_the_best_replacement_of_a_lone_effect_is_fitted(overstated, monkeypatch):
+    """A payload missed 5 % by linear algebra, and fitted better; no rival was fitted.
+
+    Around a chair that is 900 from its own fit linear algebra weighs nothing; around the fit it does.
+    """
+    looking = searching()
+    looking.base.plain.total = 2_000.0
+    looking.base.reduced.total = 2_000.0 + overstated
+    chosen = Hypothesis((ROLLING,), gain=1_000.0, score=990.0)
+    other = Hypothesis((effect("payload"),), gain=800.0, score=790.0)
+    looking.weigh = lambda starts: chosen
+    looking.near_to = lambda tried: mock.patch.object(looking, "near", looking)
+    near = []
+
+    def with_one_more(at, others, but):
+        near.append(at.near is not None)
+        return [other]
+
+    monkeypatch.setattr(rivals, "with_one_more", with_one_more)
+    fit = {"at_bound": (), "variant": Variant(()), "chi2": np.full(20, 50.0)}
+    looking.fit = lambda hypothesis, best=None: Tried(
+        hypothesis, SimpleNamespace(total=995.0, **fit)
+    )
+    (group,) = rivals.rivals_of(looking, Tried(chosen, SimpleNamespace(total=1_000.0, **fit)))
+    assert [t.hypothesis for t in group] == [other]
+    assert near == [overstated > 0.0]
+
+
 @pytest.mark.parametrize(("sigmas", "there"), [(1.8, False), (12.0, True)])
 def test_a_wind_that_ends_nearly_still_is_no_wind(sigmas, there):
     """It has a drag area, which then stands for the drag of the air; a drag has no such number."""

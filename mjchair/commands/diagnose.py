@@ -76,6 +76,7 @@ def run(args: argparse.Namespace) -> int:
     from mjchair.diagnosis.diagnose import diagnose
     from mjchair.diagnosis.replay.cache import Store
     from mjchair.effects import user_file
+    from mjchair.report import diagnosis_words
     from mjchair.storage import check_vacant, only_writer, output_folder
 
     kept = Path(args.out) / CACHE
@@ -105,6 +106,8 @@ def run(args: argparse.Namespace) -> int:
             return 130
         shutil.rmtree(kept, ignore_errors=True)
     print(f"{_line(found)}; see {folder}/report.html")
+    if found.next_experiment:
+        print(f"next: {diagnosis_words.next_step(found)}")
     return 0
 
 
@@ -194,7 +197,25 @@ def _line(found: Diagnosis) -> str:
         + (f"; cannot be told apart: {sets}" if sets else "")
         + ("; these runs are not enough to name it" if alone else "")
         + ("; more is missing" if found.more_missing else "")
+        + _likely(found)
         + f"; gap {gap.before:.2f}"
         + (f" -> {gap.after:.2f}" if gap.after is not None else "")
         + f" (noise {gap.noise_floor:.2f})"
     )
+
+
+def _likely(found: Diagnosis) -> str:
+    """How probable the effects are, or that nothing is missing; empty where neither is said."""
+    from mjchair.diagnosis.explain.calibration import NONE
+    from mjchair.diagnosis.explain.probability import of_effects
+    from mjchair.diagnosis.rules import LIKELY
+
+    if found.verdict == "unknown":
+        return ""
+    if found.effects:
+        likely = of_effects(found.probability, [e.key for e in found.effects])
+        return f"; probability {100.0 * likely:.0f} %"
+    nothing = found.probability.get(NONE, 0.0)
+    if nothing < LIKELY:
+        return "; what is left is too small to matter"
+    return f"; probability that nothing is missing {100.0 * nothing:.0f} %"

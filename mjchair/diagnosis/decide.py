@@ -92,7 +92,8 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         )
     said = rules.verdict(gap.exists, stands)
     forces = missing_forces(base)
-    size = material(base, gap, choice, sure_alone)
+    answer = None if said == Verdict.UNKNOWN else choice
+    size = material(base, gap, answer, sure_alone)
     if not rules.matters(
         force=size.value,
         limit=size.limit,

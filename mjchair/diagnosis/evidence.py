@@ -269,13 +269,13 @@ def _rolled(
 
 
 def _moved(base: Base, fitted: Fitted | None) -> tuple[Moved, ...]:
-    """What was moved, with what stands in no corrected chair: how tires give way."""
+    """What was moved, with what stands in no corrected chair: how tires give way, and sensors."""
     here = base.plain if fitted is None else fitted
     places = here.system.places
     added = [
         (n, sum(float(here.step[places[c]]) for c in _columns(n) if c in places))
         for n in here.variant.nuisances
-        if n.linear
+        if n.linear or n.channel
     ]
     return tuple(
         Moved(name=n.name, std=n.std, unit=n.unit, by=by)

@@ -33,11 +33,13 @@ BY_FORCE = 0.5  # share of a change that forces make: with less it is of a senso
 def material(base: Base, gap: Gap, choice: Choice | None, alone: InOneRun | None) -> Material:
     """The largest missing force of a study, and its limit.
 
-    The force is the one that does what the best explanation does: the chosen effects, or without
-    any the force that the tests see best. Of an effect that makes a wheel slide or shimmy no column
+    The force is the one that does what the answer does: the chosen effects, or where there is none
+    the force that the tests see best: effects that explain little of a push that somebody gave are
+    no measure of it. Of an effect that makes a wheel slide or shimmy no column
     tells how large that is, so it counts as larger than any limit.
 
     Args:
+      choice: of effects, where it is an answer.
       alone: what acts in one run alone, where that explains the gap; None: nothing does.
     """
     study = base.bench.simulator.study

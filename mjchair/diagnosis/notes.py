@@ -16,11 +16,14 @@ from mjchair.diagnosis.explain.one_run import InOneRun
 from mjchair.diagnosis.explain.run_by_run import Uneven
 from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.column_ids import RoughlyKnown
 from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.variant import Term
 from mjchair.diagnosis.result import MissingForce
 from mjchair.diagnosis.rules import Verdict
+from mjchair.effects.effect import SensorError
 
+FAR_GAIN = 2.0  # standard deviations of a sensor's gain, from which it is told
 NEAR = 1.5  # times the noise that was given: of what is nearer nothing is said
 TOP = 3  # drivers of a missing force that are worth a word
 
@@ -64,6 +67,7 @@ def notes_on(
         "something is missing there, or the study is wrong about it"
         for name in (bounded.at_walls(choice.fitted.variant.offsets) if choice else [])
     ]
+    notes += _of_gains(choice.fitted if choice else base.plain)
     if choice is not None and said in (Verdict.NAMED, Verdict.AMBIGUOUS):
         terms = choice.fitted.variant.terms
         said_of = [(term.effect.name, remark(choice.fitted, term)) for term in terms]
@@ -84,6 +88,20 @@ def notes_on(
             "body, and what of the rider moves, and how heavy it is, these channels do not tell"
         )
     return notes
+
+
+def _of_gains(fitted: Fitted) -> list[str]:
+    """A note on each sensor whose gain is far from one, for which its prior may stand in doubt."""
+    places, step = fitted.system.places, fitted.step
+    gains = [n for n in fitted.variant.nuisances if n.error is SensorError.SCALE and n.channel]
+    moved = [(n, float(step[places[c]])) for n in gains if (c := RoughlyKnown(n.name)) in places]
+    return [
+        f"{n.channel} shows {100.0 * n.std * abs(by):.2g} % too {'much' if by > 0.0 else 'little'} "
+        f"by these runs, {abs(by):.1f} standard deviations of what its gain is known to: calibrate "
+        f'it, or give "{n.name}" in [nuisance] where it is known better'
+        for n, by in moved
+        if abs(by) >= FAR_GAIN
+    ]
 
 
 def no_answer(choice: Choice, stands: rules.Standing) -> str:

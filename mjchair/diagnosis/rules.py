@@ -43,6 +43,7 @@ MOST = 3  # effects that are added
 PENALTY = 10.0  # chi2 that a parameter must bring: log of the number of samples
 WORTH = 15.0  # chi2 that a further effect must bring besides the penalty of its parameters
 LINEAR = 0.1  # share of its gain by which the linear promise of a hypothesis may be wrong
+OVERSTATED = 0.5  # of what a choice brings: more lies between a chair and its own fit (assumption)
 NEXT = 0.1  # share of the best linear gain by which a hypothesis that is fitted too may be behind
 COARSE = 0.2  # the same share around a chair that is far from the data
 TIE = 6.0  # chi2 within which hypotheses fit alike
@@ -523,6 +524,15 @@ def worth_refitting(*, behind: float, gain: float, rival_gain: float) -> bool:
         return True
     near = behind < 3.0 * RIVAL_ERRORS * math.sqrt(max(gain - rival_gain, 0.0))
     return near and rival_gain > 0.8 * gain
+
+
+def is_coarse(*, overstated: float, gain: float) -> bool:
+    """Whether linear algebra around the chair as given is too coarse to weigh what stands alike.
+
+    Args:
+      overstated: chi2 by which that chair is above its fit. gain: that the choice brings.
+    """
+    return overstated > OVERSTATED * gain
 
 
 def may_be_alike(*, less: float, own: float) -> bool:

@@ -35,6 +35,7 @@ TURNS = {"wheel_turn": str(Part.WHEEL_TURN), "caster_turn": str(Part.CASTER_TURN
 CLEAR = 0.5  # of what shakes the chair forward: a force once a turn of this size is told
 NOTABLE = 1.5  # times the noise: where a correction leaves more, what can explain it is said
 A_GAP = 0.8  # of what a correction leaves: where no more than this is a gap, the rest is explained
+ALL = 0.995  # of a gap: more is not told as 100 %
 LITTLE = 0.01  # of a person's force: less is not told
 FAINT = 1e-3  # of the loudest: less of what shakes a chair is nothing
 MUCH = 0.15  # share by which a fit moved what a person can measure, worth a word beside a name
@@ -97,7 +98,7 @@ def _sets(alternatives: Sequence[Sequence[str]]) -> str:
 def found_words(effects: Sequence[NamedEffect]) -> str:
     """What is missing on the chair, and what was recorded wrongly, as one clause."""
     lacks = " and ".join(effect_words(e) for e in effects if e.of_chair)
-    chair = [f"the chair lacks {lacks}"] if lacks else []
+    chair = [f"the model of the chair lacks {lacks}"] if lacks else []
     return ", and ".join(chair + [recording_words(e) for e in effects if not e.of_chair])
 
 
@@ -179,7 +180,8 @@ def remainder_words(diagnosis: Diagnosis) -> str:
     only = f" only with {ends} as far from what the study says as is believed" if ends else ""
     after = diagnosis.gap.after if diagnosis.gap else None
     left = f", and a remainder is left{goes}" if not ends or after is None or after > 1.0 else ""
-    explains = f"that explains {closed:.0%} of the gap{_held_out(diagnosis)}{only}{left}"
+    share_closed = f"{closed:.0%}" if closed < ALL else "nearly all"
+    explains = f"that explains {share_closed} of the gap{_held_out(diagnosis)}{only}{left}"
     return f"More is missing than what is named here: {explains}. "
 
 
@@ -383,11 +385,11 @@ def first_sentence(text: str) -> str:
 def gap_words(diagnosis: Diagnosis) -> str:
     """Whether there is a gap, with the test's result."""
     p = diagnosis.gap.p_value if diagnosis.gap else 1.0
-    exists = (
-        "It is not worth a search: the verdict is none."
-        if diagnosis.verdict == Verdict.NONE
-        else "It is more than noise."
-    )
+    exists = "It is more than noise."
+    if diagnosis.verdict == Verdict.NONE:
+        exists = (
+            "Nothing shows." if p >= LEVEL else "It is more than noise, and too small to matter."
+        )
     return (
         f"All tests together: noise alone makes such a gap with {chance(p)}, at a level of "
         f"{LEVEL:g}. {exists}"
@@ -441,7 +443,8 @@ def _open_words(diagnosis: Diagnosis) -> str:
         return "It is one explanation that fits. Another of its set fits about as well."
     likely = of_effects(diagnosis.probability, [e.key for e in diagnosis.effects])
     if likely < PROBABLE:
-        return f"It is one explanation that fits. Its probability is {likely:.0%}, below 95 %."
+        short = 0.01 * math.floor(100.0 * likely)  # 94.6 % is no 95 %
+        return f"It is one explanation that fits. Its probability is {short:.0%}, below 95 %."
     return (
         "It is one explanation that fits. What it leaves, or how well its numbers are known, is "
         "not enough to name it."

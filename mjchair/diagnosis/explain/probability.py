@@ -24,7 +24,7 @@ from mjchair.diagnosis.explain.choice import Choice, is_there
 from mjchair.diagnosis.explain.column_ids import ForceGroup
 from mjchair.diagnosis.explain.gap import groups
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
-from mjchair.diagnosis.explain.screening import Base, gain
+from mjchair.diagnosis.explain.screening import Base, gain, overstated
 from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.replay.pulses import Force
 
@@ -125,7 +125,7 @@ def weights(base: Base, choice: Choice | None) -> dict[str, Weight]:
     one = 1.0 - PRIOR_NONE - PRIOR_TWO - PRIOR_THREE - PRIOR_OUTSIDE
     out = {
         NONE: Weight(math.log(PRIOR_NONE), 0.0, True),
-        OUTSIDE: Weight(math.log(PRIOR_OUTSIDE), _outside(reduced) - 0.5 * _overstated(base), True),
+        OUTSIDE: Weight(math.log(PRIOR_OUTSIDE), _outside(reduced) - 0.5 * overstated(base), True),
     }
     kept, absent = _kept(base, choice), _absent(choice)
 
@@ -134,7 +134,7 @@ def weights(base: Base, choice: Choice | None) -> dict[str, Weight]:
         if name in absent:
             return
         share = math.prod(keys[k] / everything for k in h.keys) * math.factorial(len(h.keys))
-        gained = kept.get(name, h.gain - _overstated(base))
+        gained = kept.get(name, h.gain - overstated(base))
         evidence = _evidence(reduced, h, gained, starts)
         if name not in out or evidence > out[name].evidence:
             out[name] = Weight(math.log(prior * share), evidence, name in kept)
@@ -171,15 +171,6 @@ def _absent(choice: Choice | None) -> set[str]:
         return set()
     there = {t.hypothesis.name for t in choice.tried if is_there(t.fitted)}
     return {t.hypothesis.name for t in choice.tried} - there - {choice.hypothesis.name}
-
-
-def _overstated(base: Base) -> float:
-    """Chi2 by which linear algebra begins above the chair without effects, once that is fitted.
-
-    Where what is only roughly known lies far away, columns stand around the chair as given, and
-    every linear gain counts what the fit of these numbers alone brings.
-    """
-    return max(0.0, base.reduced.total - base.plain.total)
 
 
 def _evidence(reduced: Reduced, h: Hypothesis, gained: float, starts: Sequence[Start]) -> float:

@@ -389,6 +389,15 @@ def reaches(base: Base, fitted: Fitted) -> bool:
     return rules.reaches(total=fitted.total, promised=fitted.promised, gain=gained)
 
 
+def overstated(base: Base) -> float:
+    """Chi2 by which linear algebra begins above the chair without effects, once that is fitted.
+
+    Where what is only roughly known lies far away, columns stand around the chair as given, and
+    every linear gain counts what the fit of these numbers alone brings.
+    """
+    return max(0.0, base.reduced.total - base.plain.total)
+
+
 def goes_far(fitted: Fitted) -> bool:
     """Whether anything that is only roughly known is far from what it is known to be."""
     return any(rules.is_far(by) for by in fitted.variant.offsets.values())
