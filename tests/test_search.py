@@ -957,7 +957,7 @@ def test_a_rival_of_one_effect_is_weighed_against_what_that_effect_brings(
 def test_the_best_replacement_of_a_lone_effect_is_fitted(overstated, monkeypatch):
     """A payload missed 5 % by linear algebra, and fitted better; no rival was fitted.
 
-    Around a chair that is 900 from its own fit linear algebra weighs nothing; around the fit it does.
+    Around a chair that is 900 from its own fit linear algebra is worth nothing, around a fit it is.
     """
     looking = searching()
     looking.base.plain.total = 2_000.0

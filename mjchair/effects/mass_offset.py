@@ -24,5 +24,6 @@ EFFECT = Effect(
     signature="load shift: yaw with longitudinal acceleration (y), understeer (x)",
     source="a seated person leans a few centimetres",
     edit=edit,
+    example={"x": 0.05, "y": 0.02},
     shared={"centre_x": ("x",), "centre_y": ("y",)},
 )

@@ -36,5 +36,6 @@ EFFECT = Effect(
     source="a bag or a lap tray is 2-15 kg",
     edit=edit,
     seeds=(Seed(({"mass": 8.0, "height": LOW}, {"mass": 8.0, "height": HIGH}), _combine),),
+    example={"mass": 25.0, "height": 0.6},
     instead=("mass",),
 )

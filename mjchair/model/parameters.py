@@ -74,11 +74,15 @@ class ChairParameters:
     """
 
     axle_position: float | None = change("m", -0.15, 0.15, "rear axle forward of the model's")
-    caster_radius: float | None = change("m", 0.04, 0.15, "of the casters")
+    caster_radius: float | None = change(
+        "m", 0.04, 0.15, "of the casters; smaller ones roll harder, as 1 / radius"
+    )
     caster_trail: float | None = change("m", 0.01, 0.15, "caster axle behind its swivel axis")
     wheelbase: float | None = change("m", 0.25, 0.80, "rear axle to caster contact")
     track: float | None = change("m", 0.40, 0.90, "between the rear hubs")
-    wheel_radius: float | None = change("m", 0.10, 0.36, "of the rear wheels")
+    wheel_radius: float | None = change(
+        "m", 0.10, 0.36, "of the rear wheels; smaller ones roll harder, as 1 / radius"
+    )
     wheel_mass: float | None = change("kg", 0.3, 15.0, "of each rear wheel")
     camber: float | None = change("rad", -0.05, 0.42, "tops of the rear wheels together")
     toe: float | None = change("rad", -0.1, 0.1, "fronts of the rear wheels together")
