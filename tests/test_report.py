@@ -611,3 +611,9 @@ def test_what_a_person_does_that_nothing_shows_is_told_where_it_counts():
         levels["person"] = Estimate(value=left, std=None, unit="1")
         said = words.process_words(Diagnosis(verdict=Verdict.NONE, process=levels))
         assert ("20 % of the force by which the person moves" in said) == told
+
+
+def test_what_is_roughly_known_of_a_sensor_is_in_words():
+    names = ("centre_x", "bias:imu_gyro.z", "scale:left_wheel_speed")
+    said = ["centre x", "bias of imu_gyro.z", "gain of left_wheel_speed"]
+    assert [words.roughly_known(name) for name in names] == said

@@ -317,7 +317,7 @@ def _moved(diagnosis: Diagnosis) -> Table:
     rows = [
         Row(
             [
-                diagnosis_words.plain_name(m.name),
+                diagnosis_words.roughly_known(m.name),
                 f"{m.std:.3g}",
                 m.unit,
                 f"{m.by * m.std:+.2g}",

@@ -36,6 +36,7 @@ CLEAR = 0.5  # of what shakes the chair forward: a force once a turn of this siz
 NOTABLE = 1.5  # times the noise: where a correction leaves more, what can explain it is said
 A_GAP = 0.8  # of what a correction leaves: where no more than this is a gap, the rest is explained
 ALL = 0.995  # of a gap: more is not told as 100 %
+ERRORS = {"bias": "bias", "scale": "gain"}
 LITTLE = 0.01  # of a person's force: less is not told
 FAINT = 1e-3  # of the loudest: less of what shakes a chair is nothing
 MUCH = 0.15  # share by which a fit moved what a person can measure, worth a word beside a name
@@ -543,6 +544,12 @@ def with_error(value: float, std: float | None) -> str:
 def plain_name(name: str) -> str:
     """A name of an effect or a parameter as words."""
     return name.replace("_", " ")
+
+
+def roughly_known(name: str) -> str:
+    """What is only roughly known as words: of the chair, or the bias or gain of a sensor."""
+    error, _, channel = name.partition(":")
+    return f"{ERRORS[error]} of {channel}" if channel else plain_name(name)
 
 
 def bold(name: str) -> str:
