@@ -70,7 +70,7 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 
 
 def run(args: argparse.Namespace) -> int:
-    """Diagnose, write everything, and print the verdict on one line."""
+    """Diagnose, write everything, and print the verdict, and what to do next if anything is."""
     from mjchair.diagnosis.data.study import without_estimated_torques
     from mjchair.diagnosis.data.study_file import read_study
     from mjchair.diagnosis.diagnose import diagnose

@@ -133,6 +133,11 @@ class GapSummary:
     unforeseen: float | None = None
     noise_floor: float = 1.0
 
+    @property
+    def held_out(self) -> bool:
+        """Whether these trials are ones that no fit saw."""
+        return "held-out" in self.scope
+
 
 @dataclass(frozen=True)
 class Material:

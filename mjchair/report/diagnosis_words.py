@@ -189,7 +189,7 @@ def remainder_words(diagnosis: Diagnosis) -> str:
 def _held_out(diagnosis: Diagnosis) -> str:
     """How the gap falls on runs that no fit saw; empty: there are none."""
     gap = diagnosis.gap
-    if gap is None or gap.after is None or "held-out" not in gap.scope:
+    if gap is None or gap.after is None or not gap.held_out:
         return ""
     fell = f"from {gap.before:.1f} to {gap.after:.1f} times the noise"
     return f" in the runs of the fit ({fell} in those held out)"
@@ -251,7 +251,7 @@ def sure(diagnosis: Diagnosis) -> str:
     gap = diagnosis.gap
     if gap is None:
         return "Nothing was tested."
-    where = "On held-out runs" if "held-out" in gap.scope else "On the runs of the fit"
+    where = "On held-out runs" if gap.held_out else "On the runs of the fit"
     before = f"what the chair leaves is {size(gap.before)} times the noise"
     if diagnosis.verdict == Verdict.NONE:
         return (
@@ -444,8 +444,8 @@ def _open_words(diagnosis: Diagnosis) -> str:
         return "It is one explanation that fits. Another of its set fits about as well."
     likely = of_effects(diagnosis.probability, [e.key for e in diagnosis.effects])
     if likely < PROBABLE:
-        short = 0.01 * math.floor(100.0 * likely)  # 94.6 % is no 95 %
-        return f"It is one explanation that fits. Its probability is {short:.0%}, below 95 %."
+        told = min(likely, PROBABLE - 0.01)  # 94.6 % is no 95 %
+        return f"It is one explanation that fits. Its probability is {told:.0%}, below 95 %."
     return (
         "It is one explanation that fits. What it leaves, or how well its numbers are known, is "
         "not enough to name it."
@@ -459,7 +459,7 @@ def nearest_words(diagnosis: Diagnosis) -> str:
         return ""
     names = " with ".join(plain(key) for key in near.effects)
     gap = diagnosis.gap
-    held = " on the held-out ones" if gap is not None and "held-out" in gap.scope else ""
+    held = " on the held-out ones" if gap is not None and gap.held_out else ""
     return (
         f"The nearest, {names}, closes {near.closure:.0%} of the gap on the runs that it was "
         f"fitted to and leaves {size(near.remainder)} times the noise{held}. "

@@ -264,16 +264,8 @@ def _runs(entry: StudyEntry, path: Path, model: mujoco.MjModel) -> list[Run]:
         given = told.initial.given(trial.name) if told.initial is not None else {}
         unit_checks.check_initial(given, trial.name)
         load = None if told.load is None else Load(**structs.asdict(told.load))
-        run = Run(
-            trial,
-            told.manoeuvre,
-            told.hold_out,
-            Initial(**given),
-            frozenset(given),
-            load,
-            told.torque is not None,
-        )
-        runs.append(run)
+        run = Run(trial, told.manoeuvre, told.hold_out, Initial(**given), frozenset(given), load)
+        runs.append(replace(run, torque_estimated=told.torque is not None))
     return runs
 
 

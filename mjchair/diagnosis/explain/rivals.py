@@ -116,8 +116,8 @@ def _rivals(fits: Fits, chosen: Tried, start: Start, own: float) -> list[Tried]:
     here = chosen.hypothesis if fits.near is None else fits.weigh(starts)
     options = with_one_more(fits, others, {start.effect.key})
     near = [h for h in options if _close(here, h, own)]
-    # the first is always fitted: by linear algebra a payload of 25 kg missed 53 of 1015, and was no
-    # rival of torque gains 13 % low beside which it fits better by 13
+    # the first is always fitted: by linear algebra a payload of 25 kg brings 53 of 1015 less than
+    # torque gains 13 % low, and once it is fitted it brings 47 more
     if not near:
         near = [h for h in options[:1] if rules.may_be_alike(less=here.gain - h.gain, own=own)]
     tried = [fits.fit(h, chosen) for h in near[: REFITTED if not others else BESIDE]]
