@@ -7,6 +7,7 @@ In: chi2 of two sizes, told instead of simulated, and a fit that stops where it 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -119,3 +120,12 @@ def test_no_size_is_told_better_than_the_form_of_its_effect(name, value, own, le
     fitted.variant, fitted.std = Variant((), terms=(term,)), {key: own}
     assert with_form_errors(fitted).std[key] == pytest.approx(math.hypot(own, least), rel=0.3)
     assert with_form_errors(fitted).std[key] >= max(own, 0.99 * least)
+
+
+def test_what_two_sides_differ_by_is_known_as_their_correlation_says():
+    fitted = told((0.5, 0.3), NAMES, 0.0)
+    one, other = (ParameterId("torque_gain", name) for name in NAMES)
+    assert fitted.std_of_difference(one, other) == 0.0  # it was not looked at
+    for correlation, std in ((1.0, 0.0), (0.0, 0.01 * 2.0**0.5), (-1.0, 0.02)):
+        near = replace(fitted, correlation={frozenset((one, other)): correlation})
+        assert near.std_of_difference(one, other) == pytest.approx(std, abs=1e-12)

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,6 +16,7 @@ from mjchair.measurement.trial import Trial
 from mjchair.model import parts
 from mjchair.model.rolling import rear_axle
 from mjchair.simulation.initial import Initial
+from mjchair.simulation.inputs import Inputs
 from mjchair.tire import block
 
 TIME = np.arange(0.0, 3.0, 0.02)
@@ -463,6 +465,20 @@ def test_a_chair_that_is_pushed_to_and_fro_before_it_rolls_is_used_from_there():
     ((begin, onward),) = standstill.rests(run.trial)
     assert begin == 0.0 and 2.9 < onward < 3.2
     assert min(w.rows[0] for w in cut([run], 0.002)) * 0.01 > 2.9
+
+
+def test_strokes_on_the_spot_are_no_pushing_to_and_fro():
+    """A spin by three strokes, between which the chair stood, was used from the third one on."""
+    time = np.arange(0.0, 8.0, 0.01)
+    strokes = np.where(
+        (time > 1.0) & (time < 3.0), np.maximum(np.sin(2.0 * np.pi * time), 0.0), 0.0
+    )
+    speed = 0.5 * strokes + np.maximum(time - 3.0, 0.0)
+    run = _run(time, {"left_wheel_speed": -speed, "right_wheel_speed": speed})
+    for push, count in ((12.0, 0), (1.0, 1)):  # N m; hands that rest on the rims give less
+        torques = {"left_wheel": -push * strokes, "right_wheel": push * strokes}
+        driven = replace(run.trial, inputs=Inputs(time, torques))
+        assert len(standstill.rests(driven)) == count
 
 
 def test_a_chair_that_stands_as_its_run_ends_has_come_to_rest():

@@ -49,7 +49,7 @@ from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.process import NAMED, level
 from mjchair.diagnosis.fit.slow_part import BAND
 from mjchair.diagnosis.material import material
-from mjchair.diagnosis.next_experiment import design, wording
+from mjchair.diagnosis.next_experiment import by_hand, design, wording
 from mjchair.diagnosis.next_experiment.design import Plan
 from mjchair.diagnosis.result import (
     Candidate,
@@ -284,8 +284,11 @@ def _following(
     """The next experiment in words; empty where none is needed."""
     if said == Verdict.AMBIGUOUS and alone is not None:
         return wording.repeating(alone.trial)
-    if plan is not None:
-        return wording.deciding(plan, base.bench.simulator)
+    if said == Verdict.AMBIGUOUS and choice is not None:
+        run = [wording.deciding(plan, base.bench.simulator)] if plan is not None else []
+        told = [*run, *by_hand.sentences(choice)]
+        if told:
+            return " ".join(told)
     if said == Verdict.UNKNOWN and alone is not None:
         return wording.leaving_out(alone.trial)
     if said == Verdict.UNKNOWN:

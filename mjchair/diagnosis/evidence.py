@@ -11,15 +11,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mjchair.diagnosis.data.roughly_known import Nuisance
 from mjchair.diagnosis.data.trial_checks import tells_turning
 from mjchair.diagnosis.data.windows import Window
 from mjchair.diagnosis.explain import missing_force
 from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.explain.screening import Base
-from mjchair.diagnosis.fit.column_ids import RoughlyKnown
 from mjchair.diagnosis.fit.nonlinear import Fitted
-from mjchair.diagnosis.fit.parameter_columns import softer
 from mjchair.diagnosis.fit.slow_part import BAND
 from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.fit.variant import Variant
@@ -269,20 +266,5 @@ def _rolled(
 
 
 def _moved(base: Base, fitted: Fitted | None) -> tuple[Moved, ...]:
-    """What was moved, with what stands in no corrected chair: how tires give way, and sensors."""
     here = base.plain if fitted is None else fitted
-    places = here.system.places
-    added = [
-        (n, sum(float(here.step[places[c]]) for c in _columns(n) if c in places))
-        for n in here.variant.nuisances
-        if n.linear or n.channel
-    ]
-    return tuple(
-        Moved(name=n.name, std=n.std, unit=n.unit, by=by)
-        for n, by in (*here.variant.known_roughly, *added)
-    )
-
-
-def _columns(nuisance: Nuisance) -> tuple[RoughlyKnown, RoughlyKnown]:
-    """The columns of a nuisance, the second there only where more and less of it have their own."""
-    return RoughlyKnown(nuisance.name), RoughlyKnown(softer(nuisance))
+    return tuple(Moved(name=n.name, std=n.std, unit=n.unit, by=by) for n, by in here.moved)

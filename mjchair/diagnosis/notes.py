@@ -16,12 +16,13 @@ from mjchair.diagnosis.explain.one_run import InOneRun
 from mjchair.diagnosis.explain.run_by_run import Uneven
 from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.fit import bounded
-from mjchair.diagnosis.fit.column_ids import RoughlyKnown
+from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.variant import Term
 from mjchair.diagnosis.result import MissingForce
 from mjchair.diagnosis.rules import Verdict
 from mjchair.effects.effect import SensorError
+from mjchair.effects.left_and_right import DIFFERENCE, SIDES
 
 FAR_GAIN = 2.0  # standard deviations of a sensor's gain, from which it is told
 NEAR = 1.5  # times the noise that was given: of what is nearer nothing is said
@@ -67,7 +68,8 @@ def notes_on(
         "something is missing there, or the study is wrong about it"
         for name in (bounded.at_walls(choice.fitted.variant.offsets) if choice else [])
     ]
-    notes += _of_gains(choice.fitted if choice else base.plain)
+    if said != Verdict.UNKNOWN:  # what is missing may have moved them
+        notes += _of_gains(choice.fitted if choice else base.plain)
     if choice is not None and said in (Verdict.NAMED, Verdict.AMBIGUOUS):
         terms = choice.fitted.variant.terms
         said_of = [(term.effect.name, remark(choice.fitted, term)) for term in terms]
@@ -92,9 +94,7 @@ def notes_on(
 
 def _of_gains(fitted: Fitted) -> list[str]:
     """A note on each sensor whose gain is far from one, for which its prior may stand in doubt."""
-    places, step = fitted.system.places, fitted.step
-    gains = [n for n in fitted.variant.nuisances if n.error is SensorError.SCALE and n.channel]
-    moved = [(n, float(step[places[c]])) for n in gains if (c := RoughlyKnown(n.name)) in places]
+    moved = [(n, by) for n, by in fitted.moved if n.channel and n.error is SensorError.SCALE]
     return [
         f"{n.channel} shows {100.0 * n.std * abs(by):.2g} % too {'much' if by > 0.0 else 'little'} "
         f"by these runs, {abs(by):.1f} standard deviations of what its gain is known to: calibrate "
@@ -167,4 +167,6 @@ def remark(fitted: Fitted, term: Term) -> str:
     if term.effect.remark is None:
         return ""
     std = {p.name: fitted.std.get(key, 0.0) for key, p in term.parameters}
+    sides = [ParameterId(term.effect.key, side) for side in SIDES]
+    std[DIFFERENCE] = fitted.std_of_difference(*sides)
     return term.effect.remark(term.values, std)

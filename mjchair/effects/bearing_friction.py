@@ -11,7 +11,7 @@ from dataclasses import replace
 import mujoco
 
 from mjchair.effects.effect import Effect, Parameter
-from mjchair.effects.one_wheel import wheel_words
+from mjchair.effects.left_and_right import wheel_words
 from mjchair.model import parts
 
 
@@ -42,6 +42,7 @@ EFFECT = Effect(
     signature="torque on a rear wheel, independent of its load; a viscous part grows with speed",
     source="sizes assumed: a dragging brake is 0.1-1 N m, a dry hub less",
     edit=edit,
+    by_hand="lift each rear wheel, spin it by hand and record how it slows down",
 )
 # of a power chair a brake that drags stands for a drag on one side
 ONE_SIDED = replace(

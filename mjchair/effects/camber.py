@@ -28,4 +28,5 @@ EFFECT = Effect(
     source="sports chairs up to 20 deg; bent axles a degree or two",
     edit=edit,
     least=_least,
+    by_hand="lay a digital level against each rear wheel",
 )

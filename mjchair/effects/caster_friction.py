@@ -28,4 +28,5 @@ EFFECT = Effect(
     source="a tight headset holds 0.1-0.5 N m; assumed",
     edit=edit,
     everywhere=True,
+    by_hand="lift each caster and turn it about its stem with a spring balance",
 )

@@ -151,6 +151,7 @@ class Effect:
       recording: whether it is no fault of the chair, but of how its runs were recorded.
       remark: what values and their standard errors say in one sentence, for a verdict that names
         the effect; None: their names and units say it.
+      by_hand: how a person measures it without a run, as an order; empty: only runs show it.
     """
 
     name: str
@@ -178,6 +179,7 @@ class Effect:
     instead: tuple[str, ...] = ()
     recording: bool = False
     remark: Callable[[Mapping[str, float], Mapping[str, float]], str] | None = None
+    by_hand: str = ""
 
     @property
     def key(self) -> str:

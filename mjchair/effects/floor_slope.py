@@ -26,4 +26,5 @@ EFFECT = Effect(
     source="floors called level are so within 0.5 % to 1 %",
     edit=edit,
     common=2.0,
+    by_hand="lay a digital level on the floor, along and across the track",
 )

@@ -26,4 +26,5 @@ EFFECT = Effect(
     edit=edit,
     example={"x": 0.05, "y": 0.02},
     shared={"centre_x": ("x",), "centre_y": ("y",)},
+    by_hand="weigh each caster and each rear wheel",
 )

@@ -38,4 +38,5 @@ EFFECT = Effect(
     seeds=(Seed(({"mass": 8.0, "height": LOW}, {"mass": 8.0, "height": HIGH}), _combine),),
     example={"mass": 25.0, "height": 0.6},
     instead=("mass",),
+    by_hand="weigh the chair with all that was on it",
 )

@@ -11,7 +11,7 @@ from dataclasses import replace
 import mujoco
 
 from mjchair.effects.effect import Effect, Parameter
-from mjchair.effects.one_wheel import wheel_words
+from mjchair.effects.left_and_right import wheel_words
 from mjchair.model import parts
 from mjchair.tire import block
 

@@ -84,6 +84,21 @@ def _lag(spec: mujoco.MjSpec, channel: str, delay: float) -> None:
     parts.write_sensor(spec, sensor, data)
 
 
+def _at_rest(channel: str) -> str:
+    """How to measure the bias of what shows zero at rest; a place or an angle does not."""
+    rates = ("rad/s", "m/s", "m/s^2")
+    return f"record {channel} with the chair at rest" if sensor(channel).unit in rates else ""
+
+
+def _calibrated(channel: str) -> str:
+    """How to measure the scale of a channel."""
+    unit = sensor(channel).unit
+    if unit == "m/s^2":
+        return f"lay the sensor of {channel} on each of its sides, where it must show 9.81 m/s^2"
+    known = {"rad": "turn", "rad/s": "turn", "m": "way", "m/s": "way"}
+    return f"compare {channel} with a known {known[unit]}" if unit in known else ""
+
+
 def sensor_effects(channel: str) -> tuple[Effect, ...]:
     """sensor_bias, sensor_scale and sensor_delay of one scalar channel.
 
@@ -101,7 +116,14 @@ def sensor_effects(channel: str) -> tuple[Effect, ...]:
     lags = signature + "; its lag grows with the rate of change"
     effects = [
         Effect(
-            "sensor_bias", (bias,), signature, source, _bias(channel), channel, SensorError.BIAS
+            "sensor_bias",
+            (bias,),
+            signature,
+            source,
+            _bias(channel),
+            channel,
+            SensorError.BIAS,
+            by_hand=_at_rest(channel),
         ),
         Effect(
             "sensor_scale",
@@ -112,6 +134,7 @@ def sensor_effects(channel: str) -> tuple[Effect, ...]:
             channel,
             SensorError.SCALE,
             common=1.0 if kind.gain else COUNTED,
+            by_hand=_calibrated(channel),
         ),
     ]
     if not split(channel)[0].endswith("_tire"):

@@ -23,4 +23,5 @@ EFFECT = Effect(
     signature="symmetric: drag that grows in turns; asymmetric: side force and yaw at v > 0",
     source="Vander Wiel et al., RESNA 2016: 1 deg of toe increases rolling resistance by a quarter",
     edit=edit,
+    by_hand="measure how far apart the rear rims are in front of the hubs and behind them",
 )

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import mujoco
 
 from mjchair.effects.effect import Effect, Parameter
+from mjchair.effects.left_and_right import size_words
 from mjchair.model import edits, parts
 
 
@@ -17,15 +18,8 @@ def edit(spec: mujoco.MjSpec, left: float, right: float) -> None:
 
 
 def _sizes(values: Mapping[str, float], std: Mapping[str, float]) -> str:
-    """Both gains; of two that are free, the difference is what a run tells best that turns."""
-    said = [
-        f"{side} {100.0 * v:+.1f} ± {100.0 * std.get(side, 0.0):.2g} %"
-        for side, v in values.items()
-        if v
-    ]
-    if len(said) > 1:
-        said.append(f"left less right {100.0 * (values['left'] - values['right']):+.1f} %")
-    return ", ".join(said)
+    """Both gains in per cent, and of two their difference."""
+    return size_words(values, std, 100.0, "+.1f %")
 
 
 EFFECT = Effect(
@@ -41,4 +35,5 @@ EFFECT = Effect(
     drive=False,
     shared={"torque": ("left", "right")},
     remark=_sizes,
+    by_hand="hang a known weight on each push rim and compare the torque",
 )

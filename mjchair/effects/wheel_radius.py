@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from mjchair.effects.effect import Effect, Parameter
+from mjchair.effects.left_and_right import size_words
 from mjchair.model import edits, parts
 
 
@@ -36,21 +37,12 @@ def twisting(spec: mujoco.MjSpec, left: float, right: float) -> None:
 
 
 def _sizes(values: Mapping[str, float], std: Mapping[str, float]) -> str:
-    """Both radii; of two that are free, the difference is what the data tell best."""
-    said = [
-        f"{side} {_mm(v)} ± {1e3 * std.get(side, 0.0):.2g} mm" for side, v in values.items() if v
-    ]
-    if len(said) > 1:
-        said.append(f"left less right {_mm(values['left'] - values['right'])} mm")
-    return ", ".join(said)
+    """Both radii in mm, and of two their difference."""
+    return size_words(values, std, 1e3, "+.2f mm")
 
 
 def _sizes_on_a_frame_that_twists(values: Mapping[str, float], std: Mapping[str, float]) -> str:
     return f"{_sizes(values, std)}, on a frame that twists, so that all wheels keep their loads"
-
-
-def _mm(radius: float) -> str:
-    return f"{1e3 * radius:+.2f}"
 
 
 EFFECT = Effect(
@@ -65,5 +57,6 @@ EFFECT = Effect(
     common=2.0,
     shared={"rolling_radius": ("left", "right")},
     remark=_sizes,
+    by_hand="roll the loaded chair ten turns of each rear wheel and measure the way",
 )
 TWISTING = replace(EFFECT, edit=twisting, remark=_sizes_on_a_frame_that_twists)

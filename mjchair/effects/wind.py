@@ -59,6 +59,7 @@ EFFECT = Effect(
     edit=edit,
     common=0.1,
     outdoors=True,
+    by_hand="measure the wind on the track",
     example={"x": 2.0, "y": 2.0, "drag_area": DRAG_AREA},
     seeds=(*(_seed(a, b) for a in (1.0, -1.0) for b in (1.0, -1.0)), _light_seed()),
 )

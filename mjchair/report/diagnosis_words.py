@@ -145,7 +145,7 @@ def certain(diagnosis: Diagnosis) -> list[NamedEffect]:
 def nothing_missing(diagnosis: Diagnosis) -> str:
     """That nothing is missing, or nothing that matters, with the number."""
     gap, material = diagnosis.gap, diagnosis.material
-    far = ", if the chair is as far from what the study says as these runs put it"
+    far = ", if the chair is as far from that of the study as these runs put it"
     far = far if diagnosis.next_experiment else ""
     if gap is None or gap.p_value >= LEVEL or material is None:
         return f"Nothing{far}: the chair explains these runs as well as the noise in them allows."
@@ -178,7 +178,7 @@ def remainder_words(diagnosis: Diagnosis) -> str:
     closed = max((e.closure for e in diagnosis.effects), default=0.0)
     goes = ", which goes with " + str(diagnosis.drivers[0].goes_with) if diagnosis.drivers else ""
     ends = _at_their_ends(diagnosis)
-    only = f" only with {ends} as far from what the study says as is believed" if ends else ""
+    only = f" only with {ends} as far from the chair of the study as is believed" if ends else ""
     after = diagnosis.gap.after if diagnosis.gap else None
     left = f", and a remainder is left{goes}" if not ends or after is None or after > 1.0 else ""
     share_closed = f"{closed:.0%}" if closed < ALL else "nearly all"
@@ -267,8 +267,11 @@ def sure(diagnosis: Diagnosis) -> str:
 
 
 def _probabilities(diagnosis: Diagnosis) -> str:
-    said = [_stated(e) for e in explanations(diagnosis)[:3] if e.alone + e.more >= UNSURE]
-    return "Probability: " + ", ".join(said) + "."
+    every = explanations(diagnosis)
+    said = ", ".join(_stated(e) for e in every[:3] if e.alone + e.more >= UNSURE)
+    if diagnosis.verdict == Verdict.NONE and every[0].name != NONE:
+        return f"What makes the rest, which does not matter, is open: {said}."
+    return f"Probability: {said}."
 
 
 def _stated(explanation: Explanation) -> str:
@@ -388,9 +391,9 @@ def gap_words(diagnosis: Diagnosis) -> str:
     p = diagnosis.gap.p_value if diagnosis.gap else 1.0
     exists = "It is more than noise."
     if diagnosis.verdict == Verdict.NONE:
-        exists = (
-            "Nothing shows." if p >= LEVEL else "It is more than noise, and too small to matter."
-        )
+        small = diagnosis.material is None or diagnosis.material.value < diagnosis.material.limit
+        matters = "and too small to matter" if small else "but all that is left together is not"
+        exists = "Nothing shows." if p >= LEVEL else f"It is more than noise, {matters}."
     return (
         f"All tests together: noise alone makes such a gap with {chance(p)}, at a level of "
         f"{LEVEL:g}. {exists}"
@@ -523,7 +526,8 @@ def _parameters(effect: NamedEffect) -> Iterable[str]:
     for name, p in effect.parameters.items():
         unit = "" if p.unit == "1" else f" {p.unit}"
         size = open_upwards(p) or with_error(p.value, p.std)
-        yield f"{plain_name(name)} {size}{unit}"
+        held = " (held)" if p.std is None else ""
+        yield f"{plain_name(name)} {size}{unit}{held}"
 
 
 def open_upwards(p: Estimate) -> str:
@@ -532,9 +536,9 @@ def open_upwards(p: Estimate) -> str:
 
 
 def with_error(value: float, std: float | None) -> str:
-    """A value with its standard deviation, to the digits that this allows."""
+    """A value with its standard deviation, to the digits that this allows; None: it has none."""
     if std is None:
-        return f"{value:.4g} held"
+        return f"{value:.4g}"
     if not (0.0 < std < 1e4 and std > 1e-6):
         return f"{value:.4g} ± {std:.2g}"
     digits = max(0, 1 - math.floor(math.log10(std)))

@@ -28,6 +28,7 @@ STANDS = 0.8  # s, the shortest stand: a chair that turns back stands for less
 STANDS_AT_END = 0.2  # s, the same as a run ends: whether the chair turns back is not seen
 ROCKING = 3.0  # times those averages: a chair that rocks to rest is slower
 ROLLS = 1.0  # s, at least, before a stop or after a start: less holds no window
+PUSHES = 5.0  # N m on a wheel: hands that rest on the rims give less (assumption)
 BEFORE = 0.1  # s before the chair stands, as long as the average
 ROCKS = 2.0  # s after that: the chairs that ship rock for about as long, by assumed tire damping
 
@@ -64,6 +65,8 @@ def rests(trial: Trial) -> list[tuple[float, float]]:
         if time[a] - time[0] > ROLLS
     ]
     onward = _rolls_on(time, still)
+    if onward > time[0] and _is_pushed(trial, ~slow & (time < onward)):
+        onward = float(time[0])  # strokes on the spot, between which the chair stands
     later = [(a, b) for a, b in stops if a > onward]
     return later if onward == time[0] else [(float(time[0]), onward), *later]
 
@@ -89,6 +92,15 @@ def _rolls_on(time: Array, still: Sequence[tuple[int, int]]) -> float:
             if after < time.size and then - time[after] > ROLLS:
                 return float(time[after] if k > 0 else time[0])
     return float(time[0])
+
+
+def _is_pushed(trial: Trial, moves: NDArray[np.bool_]) -> bool:
+    """Whether a wheel is driven where the chair moves, by torques that are known."""
+    if trial.inputs is None or not moves.any():
+        return False
+    time, at = trial.inputs.time, trial.time[moves]
+    torques = [np.interp(at, time, np.nan_to_num(t)) for t in trial.inputs.controls.values()]
+    return any(float(np.abs(t).max()) > PUSHES for t in torques)
 
 
 def _longer(

@@ -298,11 +298,11 @@ def _compare_with_acceleration(trial: Trial, axle: RearAxle) -> None:
     speeds = _speeds(trial)
     if name not in trial.channels or not speeds:
         return
-    pull = _mean(trial, name)
-    if pull.time.size < 8 or _mean(trial, speeds[0]).time.size < 8:
+    pull, rolled = _mean(trial, name), _rolled(trial, axle)
+    if min(pull.time.size, rolled.time.size) < 8:
         return
     gained = cumulative_trapezoid(pull.values, pull.time, initial=0.0)
-    speed = _rolled(trial, axle, pull.time)
+    speed = at(rolled, pull.time)
     ramp = np.column_stack([np.ones(pull.time.size), pull.time])  # a slope's part, and a bias'
     speed, gained = (v - ramp @ np.linalg.lstsq(ramp, v, rcond=None)[0] for v in (speed, gained))
     sizes = np.linalg.norm(speed), np.linalg.norm(gained)
@@ -325,11 +325,12 @@ def _compare_with_acceleration(trial: Trial, axle: RearAxle) -> None:
         _refuse(trial, name, "g", f"the wheels gain {ratio:.1f} times the speed that it tells", "g")
 
 
-def _rolled(trial: Trial, axle: RearAxle, time: Array) -> Array:
-    """Speed of the axle's middle by the wheels, (n,), m/s; by one alone, less the chair's turn."""
-    sides = [name.split("_")[0] for name in _speeds(trial)]
-    rolled = [at(_mean(trial, f"{side}_wheel_speed", axle.radius(side)), time) for side in sides]
-    if len(sides) > 1 or "imu_gyro.z" not in trial.channels:
-        return np.asarray(np.mean(rolled, axis=0))
-    turn = at(_mean(trial, "imu_gyro.z"), time)
-    return rolled[0] + (0.5 if sides[0] == "left" else -0.5) * axle.track * turn
+def _rolled(trial: Trial, axle: RearAxle) -> Story:
+    """Speed of the axle's middle (m/s) by the wheels; by one alone, less the chair's turn."""
+    wheels = {n: s for n, s in forward(trial, axle).items() if n in _speeds(trial)}
+    (name, one), *others = wheels.items()
+    speeds = [one.values, *(at(other, one.time) for _, other in others)]
+    if len(wheels) == 1 and "imu_gyro.z" in trial.channels:
+        turn = at(_mean(trial, "imu_gyro.z"), one.time)
+        speeds[0] = one.values + (0.5 if name.startswith("left") else -0.5) * axle.track * turn
+    return Story(one.time, np.asarray(np.mean(speeds, axis=0)), one.unit)

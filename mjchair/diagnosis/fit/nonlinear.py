@@ -14,15 +14,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mjchair.diagnosis.data.roughly_known import Nuisance
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ColumnId, ParameterId, RoughlyKnown
-from mjchair.diagnosis.fit.parameter_columns import nuisance_columns, shared_columns, term_columns
+from mjchair.diagnosis.fit.parameter_columns import (
+    columns_of,
+    nuisance_columns,
+    shared_columns,
+    term_columns,
+)
 from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.replay.derivatives import Column
@@ -58,6 +65,7 @@ class Fitted:
       sigmas: effect key -> how far its parameters together are from neutral, in standard errors.
       at_bound: parameters that ended on a bound.
       at_least: parameter -> least size, where far larger ones fit as well.
+      correlation: of two parameters of one effect.
     """
 
     variant: Variant
@@ -72,6 +80,32 @@ class Fitted:
     sigmas: dict[str, float]
     at_bound: tuple[ParameterId, ...]
     at_least: dict[ParameterId, float] = field(default_factory=dict)
+    correlation: dict[frozenset[ParameterId], float] = field(default_factory=dict)
+
+    def std_of_difference(self, one: ParameterId, other: ParameterId) -> float:
+        """Standard deviation of one parameter less another of the same effect, SI; 0: not fitted.
+
+        Data often tell the difference of two sides far better than each of them.
+        """
+        together = self.correlation.get(frozenset((one, other)))
+        if together is None:
+            return 0.0
+        a, b = self.std[one], self.std[other]
+        return float(np.sqrt(max(a * a + b * b - 2.0 * together * a * b, 0.0)))
+
+    @property
+    def moved(self) -> list[tuple[Nuisance, float]]:
+        """What is only roughly known, and by how many standard deviations the fit moved it.
+
+        First what the variant has; then what stands in no chair: how tires give way, and sensors.
+        """
+        places = self.system.places
+        added = [
+            (n, sum(float(self.step[places[c]]) for c in columns_of(n) if c in places))
+            for n in self.variant.nuisances
+            if n.linear or n.channel
+        ]
+        return [*self.variant.known_roughly, *added]
 
 
 @dataclass(frozen=True)
@@ -245,11 +279,15 @@ def _around(
     step, _ = bounded.solve_nuisances(system, bench.windows, outside)
     system.set_cells(step[:count])  # of this very variant: nothing else of it is moved
     covariance = bounded.covariance(system, bench.windows)
-    std = {}
+    std, correlation = {}, {}
     for term in variant.terms:
         for key, p in term.parameters:
             k = system.places[key]
             std[key] = float(np.sqrt(max(covariance[k, k], 0.0))) * p.change
+        for (one, p), (other, q) in combinations(term.parameters, 2):
+            together = covariance[system.places[one], system.places[other]] * p.change * q.change
+            sizes = max(std[one] * std[other], 1e-300)
+            correlation[frozenset((one, other))] = float(together / sizes)
     terms = range(count, len(system.columns))
     return Fitted(
         variant=variant,
@@ -263,6 +301,7 @@ def _around(
         std=std,
         sigmas={t.effect.key: _sigmas(t, system, covariance) for t in variant.terms},
         at_bound=tuple(key for term in variant.terms for key in on_bound(term)),
+        correlation=correlation,
     )
 
 

@@ -88,6 +88,11 @@ def _simulates(column: Column) -> bool:
     return all(np.isfinite(window).all() for window in column)
 
 
+def columns_of(nuisance: Nuisance) -> tuple[RoughlyKnown, RoughlyKnown]:
+    """The columns of a nuisance, the second there only where more and less of it have their own."""
+    return RoughlyKnown(nuisance.name), RoughlyKnown(softer(nuisance))
+
+
 def softer(nuisance: Nuisance) -> str:
     """Name of the column of more compliance, where more and less have columns of their own."""
     return f"{nuisance.name}_softer"

@@ -114,7 +114,7 @@ MEASURED = {
 
 def measured(name: str) -> str:
     """A number that is only roughly known, by its name, as words."""
-    return MEASURED.get(name, plain(name))
+    return MEASURED.get(name, f"the {plain(name)}")
 
 
 def measuring(moved: Sequence[tuple[Nuisance, float]]) -> str:
@@ -132,8 +132,8 @@ def measuring(moved: Sequence[tuple[Nuisance, float]]) -> str:
     if not said:
         return ""
     return (
-        f"Measure what these runs put far from what the study says: {'; '.join(said)}. If it is as "
-        "the study says now, something else is missing."
+        f"Measure what these runs put far from the chair of the study: {'; '.join(said)}. If it is "
+        "as in that chair, something else is missing."
     )
 
 

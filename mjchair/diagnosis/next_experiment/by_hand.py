@@ -1,0 +1,81 @@
+"""What a scale, a ruler or a level tells apart, where no run is needed.
+
+In: the choice of effects, with its rivals. Out: sentences.
+Two things can be measured so: the size of an effect, and a number of the chair or of a sensor that
+is only roughly known, where one hypothesis needs another one than the next does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from mjchair.diagnosis.data.roughly_known import Nuisance
+from mjchair.diagnosis.explain.candidates import Start
+from mjchair.diagnosis.explain.choice import Choice
+from mjchair.diagnosis.explain.rivals import exchanged
+from mjchair.diagnosis.fit.column_ids import ParameterId
+from mjchair.diagnosis.fit.nonlinear import Fitted
+from mjchair.diagnosis.next_experiment.wording import measured, plain
+
+APART = 1.5  # standard deviations between two hypotheses, from which a number is worth measuring
+MOST = 3  # effects whose measurement is told
+CLEAR = 2.0  # standard errors from neutral of a size that is told
+
+
+def sentences(choice: Choice) -> list[str]:
+    """What a person may measure without a run, and what each hypothesis says of it."""
+    ways, apart = _effects(choice), _most_apart(choice)
+    said = [f"Without a run: {'; or '.join(ways)}."] if ways else []
+    return [*said, apart] if apart else said
+
+
+def _effects(choice: Choice) -> list[str]:
+    """How to measure each effect that has a rival, or else its rival, with its size."""
+    ways: dict[str, str] = {}
+    for without, instead, rival in exchanged(choice):
+        for starts, fitted in ((without, choice.fitted), (instead, rival.fitted)):
+            told = [s.effect.key for s in starts if s.effect.by_hand]
+            for key in told:
+                ways.setdefault(key, _way(fitted, key))
+            if told:
+                break  # what tells the one effect tells whether it is the other
+    return [way for way in ways.values() if way][:MOST]
+
+
+def _way(fitted: Fitted, key: str) -> str:
+    """How to measure an effect, and what its fit says of it; empty where that is not clear."""
+    (term,) = (t for t in fitted.variant.terms if t.effect.key == key)
+    sizes = []
+    for p in term.effect.parameters:
+        std = fitted.std.get(ParameterId(key, p.name), 0.0)
+        value = term.values[p.name]
+        if p.sized and std and abs(value - p.neutral) > CLEAR * std:
+            unit = "" if p.unit == "1" else f" {p.unit}"
+            sizes.append(f"{p.name} {value:.3g} ± {std:.1g}{unit}")
+    return f"{term.effect.by_hand} ({plain(key)}: {', '.join(sizes)})" if sizes else ""
+
+
+def _most_apart(choice: Choice) -> str:
+    """The roughly known number of which the choice and a rival say most different things."""
+    own = {n.name: by for n, by in choice.fitted.moved}
+    far, said = APART, ""
+    for without, instead, rival in exchanged(choice):
+        for n, by in rival.fitted.moved:
+            if n.linear or abs(by - own.get(n.name, by)) < far:
+                continue
+            far = abs(by - own[n.name])
+            said = (
+                f"Measure {measured(n.name)}: {_change(n, own[n.name])} from the chair of the "
+                f"study if it is {_names(without)}, {_change(n, by)} if it is {_names(instead)}."
+            )
+    return said
+
+
+def _names(starts: Sequence[Start]) -> str:
+    return " and ".join(plain(s.effect.key) for s in starts) or "nothing more"
+
+
+def _change(number: Nuisance, by: float) -> str:
+    """A number's change from the chair of the study."""
+    change = by * number.std
+    return f"{100.0 * change:+.1f} %" if number.unit == "1" else f"{change:+.2g} {number.unit}"
