@@ -526,6 +526,15 @@ def worth_refitting(*, behind: float, gain: float, rival_gain: float) -> bool:
     return near and rival_gain > 0.8 * gain
 
 
+def is_just_behind(*, gain: float, best: float) -> bool:
+    """Whether an effect may be the best, though by linear algebra it brings a little less.
+
+    Args:
+      gain: chi2 that it promises. best: that the best brings.
+    """
+    return gain > (1.0 - LINEAR) * best
+
+
 def is_coarse(*, overstated: float, gain: float) -> bool:
     """Whether linear algebra around the chair as given is too coarse to weigh what stands alike.
 
