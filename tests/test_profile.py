@@ -93,6 +93,34 @@ def test_a_fit_that_is_not_stuck_is_left_as_it_is(stuck):
     assert profile.followed(BASE, begun) is begun
 
 
+def test_of_sizes_that_make_up_for_one_another_chi2_tells_the_errors(stuck):
+    """Fits of one wind from four starts ended within 2 of chi2 and 4 standard errors apart."""
+    begun = told(TRUTH, NAMES, promised=chi2(TRUTH))
+    pair = frozenset(ParameterId("torque_gain", name) for name in NAMES)
+    loosely = replace(begun, correlation={pair: 0.8})
+    assert profile.followed(BASE, loosely) is loosely
+    end = profile.followed(BASE, replace(begun, correlation={pair: 0.97}))
+    for key in pair:
+        assert end.std[key] == pytest.approx(3.0 * begun.std[key], rel=0.01)  # chi2 hardly rises
+    assert end.sigmas["torque_gain"] == pytest.approx(begun.sigmas["torque_gain"] / 3.0, rel=0.01)
+
+
+def test_a_number_that_is_no_size_is_known_no_better_than_what_makes_up_for_it():
+    wind = find("wind")
+    x, area = (ParameterId("wind", name) for name in ("x", "drag_area"))
+    fitted = replace(
+        told(TRUTH, NAMES, 3000.0),
+        variant=Variant((), terms=(Term(wind, wind.neutral(), ("x", "drag_area")),)),
+        std={x: 0.2, area: 0.05},
+        sigmas={"wind": 20.0},
+        correlation={frozenset((x, area)): -0.9},
+    )
+    held = replace(fitted, total=fitted.total + 4.0)
+    seen = [profile.Held(x, 1.0, wind.neutral()["x"] + 1.0, held)]  # 1 m/s costs 4 of chi2
+    end = profile._with_errors(fitted, fitted, seen)
+    assert end.std == pytest.approx({x: 0.5, area: 0.05 * 0.9 * 2.5})
+
+
 def test_where_no_chair_is_beside_it_a_fit_stays(monkeypatch):
     def never(*_):
         raise MjchairError("no chair")
