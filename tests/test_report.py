@@ -362,7 +362,7 @@ def test_alternatives_that_go_together_are_said_to():
     sets = [["rolling_resistance", "toe+air_drag", "none"]]
     found = Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets)
     assert "**rolling resistance** or **toe** with **air drag** or nothing" in words.missing(found)
-    assert words.certain(dataclasses.replace(found, probability={"rolling_resistance": 1.0})) == []
+    assert words.settled(dataclasses.replace(found, probability={"rolling_resistance": 1.0})) == []
     found.alternatives = [["toe", "none"], ["toe+air_drag", "wind"]]
     said = words.missing(found)
     assert "**toe** or nothing; or **wind** in the place of **toe** with **air drag**, wh" in said
@@ -376,7 +376,7 @@ def test_what_is_in_every_explanation_is_said_before_what_is_open():
         alternatives=[rivals],
         probability={f"{name}+{BIAS.key}": 0.48 for name in rivals} | {"outside": 0.04},
     )
-    assert words.certain(found) == [BIAS]
+    assert words.settled(found) == [BIAS]
     said = words.missing(found)
     assert said.startswith("The sensor of imu_gyro.z shows 0.1")
     assert "Besides, what is missing is **rolling resistance** or **toe**, which these" in said
@@ -385,8 +385,11 @@ def test_what_is_in_every_explanation_is_said_before_what_is_open():
     )
     thin = dataclasses.replace(found, effects=[BIAS], alternatives=[])
     assert words.missing(thin).startswith("Probably (96%), the sensor of imu_gyro.z shows 0.1")
-    doubted = dataclasses.replace(found, probability={"outside": 0.5, f"toe+{BIAS.key}": 0.5})
-    assert words.certain(doubted) == []
+    likely = {f"{name}+{BIAS.key}": 0.47 for name in rivals} | {"outside": 0.06}
+    said = words.missing(dataclasses.replace(found, probability=likely))
+    assert said.startswith("Probably (94 %), the sensor of imu_gyro.z") and "Besides" in said
+    doubted = dataclasses.replace(found, probability={"outside": 0.6, f"toe+{BIAS.key}": 0.4})
+    assert words.settled(doubted) == []
 
 
 @pytest.mark.parametrize("verdict", [Verdict.NONE, Verdict.UNKNOWN])

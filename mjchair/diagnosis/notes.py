@@ -123,16 +123,17 @@ def no_answer(choice: Choice, stands: rules.Standing) -> str:
 
 def of_one_run(alone: InOneRun, choice: Choice | None) -> str:
     """A note on what explains as much in one run alone as the choice does in all, or more."""
-    names = " or ".join(h.label for h in alone.options)
+    first, *others = alone.options
     differs = "may differ" if alone.alike and not alone.sure else "differs"
+    alike = f" ({' or '.join(h.label for h in others)} fits alike)" if others else ""
     said = (
-        f"{alone.trial} {differs} from the other runs: {names} in it alone lowers chi2 by "
-        f"{alone.gain:.0f} with {_numbers(alone.options[0].free)}"
+        f"{alone.trial} {differs} from the other runs: {first.label} in it alone lowers chi2 by "
+        f"{alone.gain:.0f} with {_numbers(first.free)}{alike}"
     )
     if choice is None:
         return said
-    others = f"{alone.others:.0f} with {_numbers(choice.hypothesis.free)}"
-    return f"{said}, {choice.hypothesis.label} in all runs by {others}"
+    everywhere = f"{alone.others:.0f} with {_numbers(choice.hypothesis.free)}"
+    return f"{said}, {choice.hypothesis.label} in all runs by {everywhere}"
 
 
 def _numbers(count: int) -> str:

@@ -78,12 +78,15 @@ def _undecided(diagnosis: Diagnosis) -> str:
         if sets
         else "an effect for which the evidence is thin"
     )
-    known = certain(diagnosis)
+    known = settled(diagnosis)
     others = [e for e in diagnosis.effects if e not in known]
     chosen = "the correction has " + " and ".join(map(effect_words, others or known))
     if not known or not others:
         return f"What is missing is {doubt}; {chosen}."
-    return f"{_capital(found_words(known))}. Besides, what is missing is {doubt}; {chosen}."
+    there = of_effects(diagnosis.probability, [e.key for e in known])
+    surely = "" if there >= PROBABLE else f"probably ({share(there)}), "
+    first = _capital(f"{surely}{found_words(known)}")
+    return f"{first}. Besides, what is missing is {doubt}; {chosen}."
 
 
 def _sets(alternatives: Sequence[Sequence[str]]) -> str:
@@ -132,13 +135,13 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def certain(diagnosis: Diagnosis) -> list[NamedEffect]:
-    """Effects that are in nearly every explanation, and for which no other can stand."""
+def settled(diagnosis: Diagnosis) -> list[NamedEffect]:
+    """Effects that are in most explanations, and for which no other can stand."""
     open_ones = {n for s in diagnosis.alternatives for names in s for n in names.split("+")}
     return [
         e
         for e in diagnosis.effects
-        if e.key not in open_ones and of_effects(diagnosis.probability, [e.key]) >= PROBABLE
+        if e.key not in open_ones and of_effects(diagnosis.probability, [e.key]) >= LIKELY
     ]
 
 
@@ -191,6 +194,8 @@ def _held_out(diagnosis: Diagnosis) -> str:
     gap = diagnosis.gap
     if gap is None or gap.after is None or not gap.held_out:
         return ""
+    if gap.before <= 1.0:
+        return " in the runs of the fit (those held out show none)"
     fell = f"from {gap.before:.1f} to {gap.after:.1f} times the noise"
     return f" in the runs of the fit ({fell} in those held out)"
 

@@ -133,8 +133,9 @@ def _check_moment(trial: Trial, inputs: Inputs, turns: dict[str, Story]) -> None
     shares = {name: _moment_shares(inputs, story) for name, story in turns.items()}
     against = [name for name, share in shares.items() if (share < 0.0).all()]
     if against and not any((share > 0.0).any() for share in shares.values()):
+        seen = "the wheels turn it" if against[0] == "wheels" else f"{against[0]} turns"
         raise MjchairError(
-            f"{trial.name}: the torques turn the chair right where {against[0]} turns left; are "
+            f"{trial.name}: the torques turn the chair right where {seen} left; are "
             "the columns left_wheel and right_wheel swapped, or of the other sign?"
         )
 
