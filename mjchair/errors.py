@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from difflib import SequenceMatcher
 
 ALIKE = 0.6  # of SequenceMatcher's ratio, from which a name may have been meant
+MOST, LISTED = 40, 12  # names that are listed whole; of more, so many
 # words that people use for what has another name here; "" is none: a wheel's torque is its name
 OTHER_WORDS = {
     "velocity": "speed",
@@ -79,9 +80,13 @@ def nearest(name: str, known: Iterable[str]) -> str:
       known: the names that would have been right.
 
     Returns:
-      ``"; did you mean 'x'? (known: x, y)"``, without the question where nothing is near.
+      ``"; did you mean 'x'? (known: x, y)"``, without the question where nothing is near. Of more
+      than MOST names those that are most alike are listed.
     """
     names = sorted(known)
     close = closest(name, names)
     listing = f"known: {', '.join(names)}" if names else "none are known"
+    if len(names) > MOST:
+        alike = sorted(names, key=lambda n: -SequenceMatcher(None, name, n).ratio())[:LISTED]
+        listing = f"known: {', '.join(alike)} and {len(names) - LISTED} more"
     return f"; did you mean {close!r}? ({listing})" if close else f"; {listing}"

@@ -4,7 +4,7 @@ import pyarrow
 import pyarrow.parquet
 import pytest
 
-from mjchair.errors import MjchairError
+from mjchair.errors import MjchairError, nearest
 from mjchair.simulation.inputs import Inputs, constant, push_strokes, read_inputs
 from mjchair.simulation.table import read_table
 from mjchair.units import UNITS, quantity
@@ -170,6 +170,17 @@ def test_a_missing_file_names_its_neighbour(tmp_path, model):
     write(tmp_path / "pushes.csv", "time,left_wheel\n0,1\n")
     with pytest.raises(MjchairError, match=r"no file .*push.csv; did you mean 'pushes.csv'"):
         read_inputs(tmp_path / "push.csv", model)
+
+
+def test_a_folder_is_no_table(tmp_path):
+    with pytest.raises(MjchairError, match="is a folder; name a table in it"):
+        read_table(tmp_path)
+
+
+def test_of_many_known_names_the_most_alike_are_listed():
+    few, many = (nearest("whel_speed", [f"wheel_{k}" for k in range(n)]) for n in (40, 60))
+    assert few.count("wheel_") == 40 + ("mean" in few)
+    assert many.count("wheel_") == 12 + ("mean" in many) and many.endswith("and 48 more)")
 
 
 def test_other_suffixes_and_broken_parquet_are_refused(tmp_path, model):

@@ -133,6 +133,10 @@ def read_table(path: str | os.PathLike[str]) -> Table:
         a cell that is not a number, or as Table does.
     """
     path = Path(path)
+    if path.is_dir():
+        raise MjchairError(
+            f"{path} is a folder; name a table in it, which ends in .csv or .parquet"
+        )
     if not path.is_file():
         raise MjchairError(f"no file {path}" + _nearest_file(path))
     if path.suffix.lower() == ".parquet":
