@@ -134,9 +134,7 @@ def read_table(path: str | os.PathLike[str]) -> Table:
     """
     path = Path(path)
     if path.is_dir():
-        raise MjchairError(
-            f"{path} is a folder; name a table in it, which ends in .csv or .parquet"
-        )
+        raise MjchairError(f"{path} is a folder; give a .csv or .parquet file in it")
     if not path.is_file():
         raise MjchairError(f"no file {path}" + _nearest_file(path))
     if path.suffix.lower() == ".parquet":
