@@ -173,7 +173,7 @@ def test_a_missing_file_names_its_neighbour(tmp_path, model):
 
 
 def test_a_folder_is_no_table(tmp_path):
-    with pytest.raises(MjchairError, match="is a folder; give a .csv"):
+    with pytest.raises(MjchairError, match=r"is a folder; give a \.csv"):
         read_table(tmp_path)
 
 
