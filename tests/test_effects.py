@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import mjchair
-from mjchair.effects import bearing_friction, rolling_resistance
+from mjchair.effects import bearing_friction, rolling_resistance, toe
 from mjchair.effects.library import MECHANICAL, find, library, names
 from mjchair.errors import MjchairError
 
@@ -152,6 +152,38 @@ def test_a_drag_on_one_side_turns_the_chair_there_and_mirrored_to_the_other(form
     assert abs(turns["both"]) < 1e-3 * turns["left"]
     of_one, of_both = (losses[n] - losses["none"] for n in ("left", "both"))
     assert of_one == pytest.approx(0.5 * of_both, rel=0.05)
+
+
+def _rear_axles(form, values):
+    """Directions of the rear wheels' frames, (2, 4)."""
+    spec = mjchair.load_spec()
+    form.apply(spec, values)
+    model = spec.compile()
+    return np.array([model.body(wheel).quat for wheel in ("left_wheel", "right_wheel")])
+
+
+@pytest.mark.parametrize(
+    ("sides", "axle"), [((0.03, 0.03), (0.03, 0.0)), ((-0.02, 0.02), (0.0, 0.02))]
+)
+def test_the_toe_of_each_wheel_and_that_of_the_axle_are_one_effect(sides, axle):
+    by_side = _rear_axles(toe.ONE_SIDED, dict(zip(("left", "right"), sides, strict=True)))
+    by_axle = _rear_axles(toe.EFFECT, dict(zip(("symmetric", "asymmetric"), axle, strict=True)))
+    np.testing.assert_allclose(by_side, by_axle, atol=1e-12)
+
+
+def test_a_toe_of_one_wheel_brakes_with_its_square_and_turns_the_chair_to_its_side():
+    """The chair goes aslant, so that each wheel slips by half of the toe."""
+    runs = {}
+    for size in (0.0, 0.02, 0.04):
+        for side in ("left", "right"):
+            spec = mjchair.load_spec()
+            toe.ONE_SIDED.apply(spec, {"left": 0.0, "right": 0.0, side: size})
+            runs[size, side] = mjchair.simulate(spec, duration=2.0, initial={"speed": 1.5})
+    ends = {key: run["velocity.x"][-1] for key, run in runs.items()}
+    small, large = (ends[0.0, "left"] - ends[size, "left"] for size in (0.02, 0.04))
+    assert large == pytest.approx(4.0 * small, rel=0.1)
+    left, right = (runs[0.04, side]["heading"][-1] for side in ("left", "right"))
+    assert left > 0.005 and left == pytest.approx(-right, rel=1e-3)
 
 
 def test_drag_is_the_same_in_plain_python_and_against_the_air():

@@ -11,7 +11,7 @@ from dataclasses import replace
 import mujoco
 
 from mjchair.effects.effect import Effect, Parameter
-from mjchair.effects.left_and_right import wheel_words
+from mjchair.effects.left_and_right import size_words, wheel_words
 from mjchair.model import parts
 
 
@@ -30,7 +30,8 @@ def of_one_side(spec: mujoco.MjSpec, left: float, right: float) -> None:
 
 
 def _of_one_side(values: Mapping[str, float], std: Mapping[str, float]) -> str:
-    return f"of {wheel_words(values)}, as where something rubs on it"
+    sizes = size_words(values, std, 1.0, "+.3f N m")
+    return f"{sizes}, {wheel_words(values)}, as where something rubs on it"
 
 
 EFFECT = Effect(

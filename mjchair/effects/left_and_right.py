@@ -27,11 +27,11 @@ def size_words(
     Args:
       per: units shown in one of the parameters'. shown: format of a size with its sign, and unit.
     """
-    digits, unit = shown.split(" ")
+    digits, _, unit = shown.partition(" ")
 
     def sized(name: str, value: float) -> str:
         error = f" ± {per * std[name]:.2g}" if std.get(name) else ""
-        return f"{name} {per * value:{digits}}{error} {unit}"
+        return f"{name} {per * value:{digits}}{error} {unit}".rstrip()
 
     said = [sized(side, value) for side, value in values.items() if value]
     if len(said) > 1:

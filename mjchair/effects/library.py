@@ -53,6 +53,7 @@ MECHANICAL = (
     wind.EFFECT,
     floor_slope.EFFECT,
     toe.EFFECT,
+    toe.ONE_SIDED,
     camber.EFFECT,
     mass_offset.EFFECT,
     payload.EFFECT,
