@@ -63,6 +63,7 @@ def fit(total, *keys, promised=None):
         track=f"track of {'+'.join(sorted(keys))}",
         sigmas=dict.fromkeys(keys, 3.0),
         at_bound=(),
+        correlation={},
     )
 
 

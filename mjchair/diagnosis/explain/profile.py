@@ -56,9 +56,9 @@ def followed(base: Base, fitted: Fitted) -> Fitted:
     not stuck, and of whose sizes none makes up for another, comes back as it is.
     """
     stuck = rules.is_stuck(total=fitted.total, promised=fitted.promised)
-    looked = [key for key in _sizes(fitted) if stuck or _makes_up(fitted, key)]
-    if not looked:
+    if not stuck and not _make_up(fitted):
         return fitted
+    looked = [key for key in _sizes(fitted) if stuck or key in _make_up(fitted)]
     path, seen, away = [fitted], list[Held](), AWAY
     sides = [(key, side) for key in looked for side in (-1.0, 1.0)]
     for _ in range(ROUNDS):
@@ -76,9 +76,9 @@ def followed(base: Base, fitted: Fitted) -> Fitted:
     return _with_errors(next(f for f in path if f.total <= alike), path[-1], seen)
 
 
-def _makes_up(fitted: Fitted, key: ParameterId) -> bool:
-    """Whether a size makes up for another number of its effect."""
-    return any(key in pair and abs(r) > MAKES_UP for pair, r in fitted.correlation.items())
+def _make_up(fitted: Fitted) -> set[ParameterId]:
+    """The numbers that make up for another one of their effect."""
+    return {key for pair, r in fitted.correlation.items() if abs(r) > MAKES_UP for key in pair}
 
 
 def _wider(fitted: Fitted, key: ParameterId, std: Mapping[ParameterId, float]) -> Iterator[float]:
