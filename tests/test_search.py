@@ -1063,3 +1063,20 @@ def test_another_form_of_an_effect_stands_in_where_the_first_leaves_a_gap(
     assert best.hypothesis.starts == ((whole,) if taken else (wave,))
     assert gap.exists == (first_leaves and not taken)
     assert asked == ([(whole,)] if first_leaves else [])
+
+
+@pytest.mark.parametrize(
+    ("name", "promised", "several", "looked"),
+    [
+        ("wind", 1017.0, True, True),  # it misses 5 % of what both bring
+        ("wind", 900.0, True, False),
+        ("wind", 1017.0, False, False),  # a rival of one effect is fitted as such
+        ("floor_slope", 1017.0, True, False),  # it is one of them
+    ],
+)
+def test_a_single_effect_just_behind_several_is_fitted(name, promised, several, looked):
+    """A wind of 3.6 m/s stood in no set: a slope with a bearing's friction was chosen."""
+    keys = ("floor_slope", "bearing_friction")[: 2 if several else 1]
+    chosen = SimpleNamespace(keys=keys, starts=keys, gain=1069.0)
+    single = SimpleNamespace(name=name, gain=promised)
+    assert probable._is_just_behind(single, SimpleNamespace(hypothesis=chosen)) is looked
