@@ -3,14 +3,11 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
-from mjchair.diagnosis.explain import noise_shown, screening
-from mjchair.diagnosis.explain.column_ids import Driver, ForceColumn, ForceGroup, Quantity
+from mjchair.diagnosis.explain import screening
 from mjchair.diagnosis.explain.screening import LOUD, QUIETER
 from mjchair.diagnosis.fit.variant import Term
-from mjchair.diagnosis.replay.pulses import Force
 from mjchair.effects.effect import Effect, Parameter
 from mjchair.errors import MjchairError
 
@@ -160,23 +157,3 @@ def test_an_effect_on_a_bound_begins_where_it_ended_beside_another():
     assert screening._off_bounds((bound, inside), []) == (bound, inside)
     before = [ended, replace(inside, values={"length": 0.02})]
     assert screening._off_bounds((bound, inside), before) == (ended, inside)
-
-
-def test_a_force_throughout_one_run_is_no_noise(monkeypatch):
-    """A brake of 1 N m on one wheel in one coast of three passed for what shakes the chair."""
-    speed = ForceColumn(ForceGroup(Force.YAW, Driver(Quantity.SPEED)), 0)
-    seconds = {
-        ForceColumn(ForceGroup(Force.YAW, Driver(Quantity.TIME, trial)), second): [
-            np.array([[float(second == first), 0.0]]) for first in (0, 2)
-        ]
-        for trial in ("a", "b")
-        for second in range(4)
-    }
-    known = {speed: [np.array([[0.5, 0.1]])] * 2, **seconds}
-    monkeypatch.setattr(noise_shown.missing_force, "driver_columns", lambda *_: known)
-    columns = noise_shown._smooth(None, None, (), ())
-    wide = noise_shown.SPREAD[Force.YAW]
-    assert len(columns) == 3  # what goes with speed, and one force a run
-    for key, column in columns.items():
-        one = known[speed] if key == speed else [np.array([[1.0, 0.0]])] * 2
-        np.testing.assert_allclose(column, [wide * window for window in one])

@@ -151,21 +151,13 @@ def _most(simulator: WindowSimulator) -> dict[Part, Array]:
 def _smooth(
     bench: Bench, first: Track, pulses: Sequence[Pulse], answers: Sequence[Array]
 ) -> dict[ColumnId, Column]:
-    """Forces that go with something, or act throughout one run, of one standard deviation."""
+    """Forces that go with something other than the time, of one standard deviation."""
     columns = missing_force.driver_columns(bench, first, pulses, answers)
-    out: dict[ColumnId, Column] = {}
-    for key, column in columns.items():
-        assert isinstance(key, ForceColumn)
-        wide = [SPREAD[key.group.force] * window for window in column]
-        if key.group.driver.quantity == Quantity.TIME:
-            throughout = ForceColumn(key.group, 0)  # its seconds together
-            known = out.get(throughout)
-            out[throughout] = (
-                wide if known is None else [a + b for a, b in zip(known, wide, strict=True)]
-            )
-        else:
-            out[key] = wide
-    return out
+    return {
+        key: [SPREAD[key.group.force] * window for window in column]
+        for key, column in columns.items()
+        if isinstance(key, ForceColumn) and key.group.driver.quantity != Quantity.TIME
+    }
 
 
 def _sensors(bench: Bench, first: Track) -> dict[ColumnId, Column]:
