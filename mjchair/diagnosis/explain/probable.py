@@ -37,12 +37,10 @@ def _not_yet_fitted(fits: Fits, choice: Choice) -> list[Hypothesis]:
     worth = shown(probability, choice.hypothesis.name) - known
     reduced, starts = fits.base.reduced, fits.base.starts
     singles = hypotheses.singles(reduced, starts)
-    behind = [h for h in singles if h.name not in known and _is_just_behind(h, choice)]
-    if not worth:
-        return behind[:FITTED]
-    found = [h for h in (*singles, *hypotheses.pairs(reduced, starts)) if h.name in worth]
-    found = sorted(found, key=lambda h: -probability[h.name])
-    return [*found, *(h for h in behind if h.name not in worth)][:FITTED]
+    pairs = hypotheses.pairs(reduced, starts) if worth else []
+    found = [h for h in (*singles, *pairs) if h.name in worth]
+    left = [h for h in singles if h.name not in known | worth and _is_just_behind(h, choice)]
+    return [*sorted(found, key=lambda h: -probability[h.name]), *left][:FITTED]
 
 
 def _is_just_behind(single: Hypothesis, choice: Choice) -> bool:

@@ -56,9 +56,10 @@ def followed(base: Base, fitted: Fitted) -> Fitted:
     not stuck, and of whose sizes none makes up for another, comes back as it is.
     """
     stuck = rules.is_stuck(total=fitted.total, promised=fitted.promised)
-    if not stuck and not _make_up(fitted):
+    entwined = _make_up(fitted)
+    if not stuck and not entwined:
         return fitted
-    looked = [key for key in _sizes(fitted) if stuck or key in _make_up(fitted)]
+    looked = [key for key in _sizes(fitted) if stuck or key in entwined]
     path, seen, away = [fitted], list[Held](), AWAY
     sides = [(key, side) for key in looked for side in (-1.0, 1.0)]
     for _ in range(ROUNDS):

@@ -1,21 +1,20 @@
 """What a scale, a ruler or a level tells apart, where no run is needed.
 
-In: the choice of effects, with its rivals. Out: sentences.
-Two things can be measured so: the size of an effect, and a number of the chair or of a sensor that
-is only roughly known, where one hypothesis needs another one than the next does.
+In: the choice of effects, with its rivals. Out: sentences. Two things can be measured so: the size
+of an effect, and a number of the chair or of a sensor that is only roughly known, where two
+hypotheses need it to be different.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mjchair.diagnosis.data.roughly_known import Nuisance
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Choice
 from mjchair.diagnosis.explain.rivals import exchanged
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted
-from mjchair.diagnosis.next_experiment.wording import measured, plain
+from mjchair.diagnosis.next_experiment.wording import changed, measured, plain
 
 APART = 1.5  # standard deviations between two hypotheses, from which a number is worth measuring
 MOST = 3  # effects whose measurement is told
@@ -65,17 +64,11 @@ def _most_apart(choice: Choice) -> str:
                 continue
             far = abs(by - own[n.name])
             said = (
-                f"Measure {measured(n.name)}: {_change(n, own[n.name])} from the chair of the "
-                f"study if it is {_names(without)}, {_change(n, by)} if it is {_names(instead)}."
+                f"Measure {measured(n.name)}: {changed(n, own[n.name], 1)} from the chair of the "
+                f"study if it is {_names(without)}, {changed(n, by, 1)} if it is {_names(instead)}."
             )
     return said
 
 
 def _names(starts: Sequence[Start]) -> str:
     return " and ".join(plain(s.effect.key) for s in starts) or "nothing more"
-
-
-def _change(number: Nuisance, by: float) -> str:
-    """A number's change from the chair of the study."""
-    change = by * number.std
-    return f"{100.0 * change:+.1f} %" if number.unit == "1" else f"{change:+.2g} {number.unit}"

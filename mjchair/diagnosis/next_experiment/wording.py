@@ -117,6 +117,18 @@ def measured(name: str) -> str:
     return MEASURED.get(name, f"the {plain(name)}")
 
 
+def changed(number: Nuisance, by: float, digits: int = 0) -> str:
+    """By how much a number is not that of the study's chair.
+
+    Args:
+      by: standard deviations. digits: of a share, in per cent.
+    """
+    change = by * number.std
+    return (
+        f"{100.0 * change:+.{digits}f} %" if number.unit == "1" else f"{change:+.2g} {number.unit}"
+    )
+
+
 def measuring(moved: Sequence[tuple[Nuisance, float]]) -> str:
     """What to measure where runs are explained by a chair that is far from what the study says.
 
@@ -124,11 +136,7 @@ def measuring(moved: Sequence[tuple[Nuisance, float]]) -> str:
       moved: what is only roughly known, and by how many of its standard deviations it was moved,
         of those that are far; empty where none is.
     """
-    said = []
-    for n, by in moved:
-        change = by * n.std
-        size = f"{100.0 * change:+.0f} %" if n.unit == "1" else f"{change:+.2g} {n.unit}"
-        said.append(f"{measured(n.name)}: {size}, {abs(by):.1f} sigmas")
+    said = [f"{measured(n.name)}: {changed(n, by)}, {abs(by):.1f} sigmas" for n, by in moved]
     if not said:
         return ""
     return (
