@@ -2,7 +2,7 @@
 
 Two forms, one name. The drag of a toed wheel goes with the square of its toe and acts on its own
 side, so that what turns both and what turns them against one another do not add up to a toe of one
-wheel: by linear algebra around none, 2 degrees of one wheel promised a quarter of what they bring.
+wheel: by linear algebra around none, 2 degrees of one wheel promised 167 of chi2 and bring 727.
 """
 
 from __future__ import annotations

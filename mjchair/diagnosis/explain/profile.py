@@ -11,8 +11,9 @@ much as tells two sizes apart. A fit with one size held needs no such difference
 valley, and shows how steep the sides are.
 
 A size that makes up for another number, as a wind does for the area that it meets, is known by a
-small part of each of two columns, which is as small as what is wrong in them: fits of one wind from
-four starts ended within 2 of chi2 and 0.9 m/s apart, four of its standard errors.
+small part of each of two columns, which is as small as what is wrong in them: with a little less
+noise than is estimated now, fits of one wind from four starts ended within 2 of chi2 and 0.9 m/s
+apart, four of its standard errors.
 """
 
 from __future__ import annotations
