@@ -40,13 +40,13 @@ def start(name):
     )
 
 
-def problem(forces, shows=(1.0, 1.0, 1.0), runs=RUNS):
+def problem(forces, shows=(1.0, 1.0, 1.0), runs=RUNS, seed=4):
     """A base, and the choice of a drag of one size in all runs.
 
     Args:
       forces: N, drag in each run. shows: share of the drag that each run shows.
     """
-    rng = np.random.default_rng(4)
+    rng = np.random.default_rng(seed)
     run = np.repeat(np.arange(len(runs)), WINDOWS)
     G, b, c = np.zeros((run.size, 3, 3)), np.zeros((run.size, 3)), np.zeros(run.size)
     for i, k in enumerate(run):
@@ -100,6 +100,13 @@ def test_a_brake_that_rubs_in_one_run_is_found_with_its_size():
     assert errors["force"] == pytest.approx(STEP / np.sqrt(WINDOWS * ROWS), rel=0.1)
     assert abs(term.values["force"] - 1.5) < 4.0 * errors["force"]
     assert found.gain > 2.0 * found.others
+
+
+def test_noise_brings_as_much_as_rarely_as_is_said():
+    problems = [problem((0.0, 0.0, 0.0), seed=k)[0] for k in range(400)]
+    chances = [one_run._by_chance(base, base.acting_alone) for base in problems]
+    assert 0.05 < np.mean(np.array(chances) < 0.1) < 0.15
+    assert found_in(*problem((0.0, 1.5, 0.0))).p < 1e-10
 
 
 def test_it_is_found_where_no_effect_explains_all_runs():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import mjchair
+from mjchair.diagnosis import decide
 from mjchair.diagnosis.data.study import Run, make_study
 from mjchair.diagnosis.diagnose import diagnose
 from mjchair.diagnosis.rules import Verdict
@@ -62,3 +63,11 @@ def test_its_size_is_told_with_the_effects_that_fit_alike(found):
 def test_no_run_alone_shakes_the_others(found):
     """A force of 7 N in one run had all runs shaken by 2 N."""
     assert found.process["drive"].value < 0.5
+
+
+def test_it_shows_though_all_runs_together_scatter_like_noise(found, monkeypatch):
+    """A wheel that rubbed with 1 N m in one coast of three was nothing that matters."""
+    monkeypatch.setattr(decide, "gap_foretold", lambda base: 1.0)
+    base, gap = found.stages.base, replace(found.stages.gap, p=1e-5, excess=0.0)
+    said = decide.conclude(base, gap, None)
+    assert said.verdict == Verdict.UNKNOWN and said.one_run.trial == "b"

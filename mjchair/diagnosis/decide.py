@@ -83,6 +83,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     stands = standing(base, choice, closed, probability) if choice else None
     alone = in_one_run(base, gap, choice) if gap.exists else None
     sure_alone = alone if alone and alone.sure else None
+    chance = min(gap.p, sure_alone.p) if sure_alone else gap.p
     if stands:
         stands = replace(
             stands,
@@ -99,7 +100,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         limit=size.limit,
         gap=gap_foretold(base),
         excess=gap.excess_sigmas,
-        p=gap.p,
+        p=chance,
         told=base.bench.simulator.study.material is not None,
         said=said,
         sigmas=min(stands.sigmas, default=0.0) if stands else 0.0,
@@ -108,8 +109,8 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         freed=bool(choice and _walls(base.plain) and not _walls(choice.fitted)),
     ):
         said = Verdict.NONE
-    if (said == Verdict.UNKNOWN and choice is None) or rules.surely(gap.p):
-        probability = with_gap(probability, gap.p)
+    if (said == Verdict.UNKNOWN and choice is None) or rules.surely(chance):
+        probability = with_gap(probability, chance)
     if alone is not None and not rules.says_one_run(said, alike=alone.alike):
         alone = None
     if alone is not None:

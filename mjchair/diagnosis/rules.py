@@ -370,7 +370,8 @@ def matters(
         only roughly known. excess: of the whole slow residual above what noise gives, in its
         standard deviations; what makes none and is explained by nothing, or by what is rather not
         there, does not matter, however large the force of a test that stands out.
-      p: of the gap, by chance; one of SURELY shows, whatever the whole residual does.
+      p: of the gap, by chance, or of what surely acts in one run alone; one of SURELY shows,
+        whatever the whole residual does.
       told: whether the person who asks gave the limit.
       probability: that an effect of the answer is there.
       nothing: whether that nothing is missing is more probable than any one explanation; then the

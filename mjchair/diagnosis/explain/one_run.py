@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import event, hypotheses
@@ -31,6 +32,7 @@ class InOneRun:
       options: those that these runs do not tell apart, best first.
       gain: chi2 that the best brings. others: that the choice brings in all runs.
       by: chi2 by which the best is better, both less what their parameters must bring.
+      p: that noise alone brings as much by the best of all effects in all runs.
       sure: whether no choice stands against it. alike: whether it is a rival of the choice. Where
         it is neither, only a choice that is no answer gives way to it.
     """
@@ -41,6 +43,7 @@ class InOneRun:
     gain: float
     others: float
     by: float
+    p: float
     sure: bool
     alike: bool
 
@@ -97,6 +100,14 @@ def in_one_run(base: Base, gap: Gap, choice: Choice | None) -> InOneRun | None:
         gain=brings,
         others=others,
         by=by,
+        p=_by_chance(base, acting),
         sure=sure,
         alike=rival,
     )
+
+
+def _by_chance(base: Base, acting: ActingIn) -> float:
+    """Chance that noise alone brings as much by the best of these effects, each in every run."""
+    best = acting.options[0]
+    tests = len(acting.options) * np.unique(base.system.run[base.bench.windows]).size
+    return min(1.0, tests * float(stats.chi2.sf(best.gain, best.free)))
