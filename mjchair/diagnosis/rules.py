@@ -465,6 +465,18 @@ def worth_trying(*, score: float, best: float, gain: float, coarse: bool = False
     return best - score < max((COARSE if coarse else NEXT) * gain, RIVAL_CHI2)
 
 
+def may_be_as_good(*, promised: float, behind: float, gain: float, brought: float) -> bool:
+    """Whether an effect may be as good as the best though its fit, from one start, is not.
+
+    Args:
+      promised: chi2 by which linear algebra says that it is worse; gain: that it promises.
+      behind: by which that promise is worse than the fit of the best. brought: that this fit
+        brings; where it brings far more than all promises, these say nothing.
+    """
+    near = worth_trying(score=-promised, best=0.0, gain=gain)
+    return near and not is_coarse(overstated=behind, gain=brought)
+
+
 def ends_elsewhere(*, behind: float, promised: float, gain: float) -> bool:
     """Whether a fit is so much further behind another than linear algebra says, that it is stuck.
 
