@@ -63,7 +63,7 @@ def test_where_a_chair_gains_speed_without_torque_somebody_may_have_pushed_all_a
 def test_what_to_do_about_an_event_is_to_cut_it_out_but_not_a_whole_run():
     """Where somebody may have pushed all along, the next step is to leave the run out."""
     note = notes.of_event(event.Event(gain=95.0, trial="a", begin=1, end=3), share=0.9)
-    assert "between 1 and 3 s" in note and "90%" in note
+    assert "between 1 and 3 s" in note and "90 %" in note
     assert note.endswith("cut the trial there")
     pushed = event.Event(gain=165.0, trial="a", begin=0, end=5, whole=True)
     assert "cut" not in notes.of_event(pushed, share=0.9)

@@ -663,8 +663,9 @@ def test_a_channel_at_its_end_is_said_and_a_whole_one_is_not(tmp_path, capsys):
     propulsion_with(tmp_path / "push_left.csv", lambda moment: min(moment, 6.0))
     ends = [line for line in gather(tmp_path).notes if "sensor at its end" in line]
     values = read_delimited(samples.propulsion()).values[:, 23]
+    share = 100.0 * np.mean(values >= 6.0)
     assert ends == [
-        f"push_left.csv: Mz is 6.00 N m in {np.mean(values >= 6.0):.0%} of the samples and never "
+        f"push_left.csv: Mz is 6.00 N m in {share:.0f} % of the samples and never "
         "beyond: a sensor at its end tells less than was there"
     ]
     assert main(["outcomes", str(tmp_path / "push_left.csv")]) == 0

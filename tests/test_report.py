@@ -205,7 +205,7 @@ def test_it_is_said_why_what_fits_is_not_named():
     rare = dataclasses.replace(
         open_sets, alternatives=[], effects=[effect], probability={effect.key: 0.21}
     )
-    assert words.choice_words(rare).endswith("Its probability is 21%, below 95 %.")
+    assert words.choice_words(rare).endswith("Its probability is 21 %, below 95 %.")
     left = dataclasses.replace(rare, probability={effect.key: 0.97})
     assert "not enough to name it" in words.choice_words(left)
 
@@ -346,7 +346,7 @@ def test_how_probable_a_lone_effect_is_stands_in_the_first_sentence():
         probability={"rolling_resistance": 0.8, "rolling_resistance+toe": 0.07, "none": 0.13},
     )
     said = words.missing(found)
-    assert said.startswith("Probably (87%), the model of the chair lacks **rolling resistance** (")
+    assert said.startswith("Probably (87 %), the model of the chair lacks **rolling resistance** (")
     assert said.endswith("; these runs are not enough to name it.")
     found.probability = {"rolling_resistance": 0.4, "outside": 0.6}
     assert "the evidence is thin" in words.missing(found)
@@ -384,7 +384,7 @@ def test_what_is_in_every_explanation_is_said_before_what_is_open():
         "the correction has **rolling resistance** (coefficient 0.01460 ± 0.00040)."
     )
     thin = dataclasses.replace(found, effects=[BIAS], alternatives=[])
-    assert words.missing(thin).startswith("Probably (96%), the sensor of imu_gyro.z shows 0.1")
+    assert words.missing(thin).startswith("Probably (96 %), the sensor of imu_gyro.z shows 0.1")
     likely = {f"{name}+{BIAS.key}": 0.47 for name in rivals} | {"outside": 0.06}
     said = words.missing(dataclasses.replace(found, probability=likely))
     assert said.startswith("Probably (94 %), the sensor of imu_gyro.z") and "Besides" in said
@@ -424,14 +424,14 @@ def test_where_nothing_was_corrected_there_is_no_after():
     html = page(diagnosis(Verdict.UNKNOWN), {})
     assert "corrected" not in html.replace("corrected chair (model.xml)", "")
     assert "after" not in re.findall("<summary><h2>6.*?</h2>", html)[0]
-    assert "wind with toe, closes 94% of the gap on the runs that it was fitted to" in html
+    assert "wind with toe, closes 94 % of the gap on the runs that it was fitted to" in html
     assert "and leaves 9.4 times the noise" in html
 
 
 def test_the_section_of_the_choice_does_not_contradict_the_notes():
     html = page(diagnosis(Verdict.UNKNOWN), {})
     section = html[html.index("4. Which one") : html.index("5. Whole")]
-    assert "94%" in section and html.count("94%") == 1
+    assert "94 %" in section and html.count("94 %") == 1
     assert "What is only roughly known" in html  # the table of what was moved is there
 
 

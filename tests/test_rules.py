@@ -163,7 +163,7 @@ def test_held_out_runs_that_contradict_an_answer_are_named_beside_what_it_closes
     choice = SimpleNamespace(fitted=SimpleNamespace(variant=SimpleNamespace(terms=[effect])))
     held = HeldOut(before=400.0, after=900.0, dof=100.0, changed=600.0)
     note = notes.no_answer(choice, replace(CLEAR, closure=1.0, held_out=held))
-    assert "air_drag, closes 100% of it on the runs" in note
+    assert "air_drag, closes 100 % of it on the runs" in note
     assert note.endswith("2.00 of the noise without it and 3.00 with it")
     kept = replace(held, after=150.0)
     assert "contradict" not in notes.no_answer(choice, replace(CLEAR, held_out=kept))

@@ -109,7 +109,7 @@ def no_answer(choice: Choice, stands: rules.Standing) -> str:
     names = " and ".join(t.effect.key for t in choice.fitted.variant.terms)
     nearest = (
         f"nothing in the library explains the gap; the nearest, {names}, closes "
-        f"{stands.closure:.0%} of it on the runs that it was fitted to"
+        f"{100.0 * stands.closure:.0f} % of it on the runs that it was fitted to"
     )
     held = stands.held_out
     if held is None or not rules.opens_a_gap(held):
@@ -143,7 +143,7 @@ def _numbers(count: int) -> str:
 
 def of_event(once: event.Event, share: float) -> str:
     """A note on an event that alone brings this share of what any test shows."""
-    of_all = f"{share:.0%} of what any test shows"
+    of_all = f"{100.0 * share:.0f} % of what any test shows"
     if once.whole:
         return f"it may be pushes that nobody measured: forces in {once.trial} alone bring {of_all}"
     return (

@@ -255,8 +255,9 @@ def at_its_end(run: PushRim) -> list[str]:
             if at.mean() >= ENDS and longest >= IN_A_ROW:
                 unit = "N" if name.startswith("F") else "N m"
                 out.append(
-                    f"{Path(run.source).name}: {name} is {end:.2f} {unit} in {at.mean():.0%} of "
-                    "the samples and never beyond: a sensor at its end tells less than was there"
+                    f"{Path(run.source).name}: {name} is {end:.2f} {unit} in "
+                    f"{100.0 * at.mean():.0f} % of the samples and never beyond: a sensor at its "
+                    "end tells less than was there"
                 )
     return out
 

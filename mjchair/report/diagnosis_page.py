@@ -230,7 +230,7 @@ def _candidate(c: Candidate, closes: bool, alike: bool) -> list[str]:
         _signature(c),
         f"{c.detectability:.1f}",
         f"{c.held_out_gain:,.0f}",
-        *([f"{c.closure:.0%}"] if closes else []),
+        *([f"{100.0 * c.closure:.0f} %"] if closes else []),
         *([f"{c.collinear:.2f}"] if alike else []),
     ]
 
@@ -260,7 +260,7 @@ def _effects(diagnosis: Diagnosis) -> Table:
                 diagnosis_words.open_upwards(p) or f"{p.value:.4g}",
                 "held" if p.std is None else f"{p.std:.2g}",
                 p.unit,
-                f"{e.closure:.0%}",
+                f"{100.0 * e.closure:.0f} %",
             ]
         )
         for e in diagnosis.effects

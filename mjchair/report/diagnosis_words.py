@@ -72,7 +72,7 @@ def _undecided(diagnosis: Diagnosis) -> str:
     likely = of_effects(diagnosis.probability, [e.key for e in diagnosis.effects])
     if not sets and likely >= LIKELY:
         what = found_words(diagnosis.effects)
-        return f"Probably ({likely:.0%}), {what}; these runs are not enough to name it."
+        return f"Probably ({share(likely)}), {what}; these runs are not enough to name it."
     doubt = (
         f"{sets}, which these runs cannot tell apart"
         if sets
@@ -184,7 +184,7 @@ def remainder_words(diagnosis: Diagnosis) -> str:
     only = f" only with {ends} as far from the chair of the study as is believed" if ends else ""
     after = diagnosis.gap.after if diagnosis.gap else None
     left = f", and a remainder is left{goes}" if not ends or after is None or after > 1.0 else ""
-    share_closed = f"{closed:.0%}" if closed < ALL else "nearly all"
+    share_closed = f"{100.0 * closed:.0f} %" if closed < ALL else "nearly all"
     explains = f"that explains {share_closed} of the gap{_held_out(diagnosis)}{only}{left}"
     return f"More is missing than what is named here: {explains}. "
 
@@ -438,7 +438,7 @@ def choice_words(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == Verdict.AMBIGUOUS:
         return _open_words(diagnosis)
     rules = (
-        f"None is named. An answer closes at least {PARTLY:.0%} of the gap and holds on "
+        f"None is named. An answer closes at least {100.0 * PARTLY:.0f} % of the gap and holds on "
         f"{other_runs(diagnosis)}; no effect, nor two or three together, does both. "
     )
     if diagnosis.one_run is not None:
@@ -453,7 +453,9 @@ def _open_words(diagnosis: Diagnosis) -> str:
     likely = of_effects(diagnosis.probability, [e.key for e in diagnosis.effects])
     if likely < PROBABLE:
         told = min(likely, PROBABLE - 0.01)  # 94.6 % is no 95 %
-        return f"It is one explanation that fits. Its probability is {told:.0%}, below 95 %."
+        return (
+            f"It is one explanation that fits. Its probability is {100.0 * told:.0f} %, below 95 %."
+        )
     return (
         "It is one explanation that fits. What it leaves, or how well its numbers are known, is "
         "not enough to name it."
@@ -469,8 +471,8 @@ def nearest_words(diagnosis: Diagnosis) -> str:
     gap = diagnosis.gap
     held = " on the held-out ones" if gap is not None and gap.held_out else ""
     return (
-        f"The nearest, {names}, closes {near.closure:.0%} of the gap on the runs that it was "
-        f"fitted to and leaves {size(near.remainder)} times the noise{held}. "
+        f"The nearest, {names}, closes {100.0 * near.closure:.0f} % of the gap on the runs that it "
+        f"was fitted to and leaves {size(near.remainder)} times the noise{held}. "
     )
 
 

@@ -36,7 +36,7 @@ def _of_run(trial: Trial, torque_measured: bool) -> list[str]:
         for end in _ends(values):
             share = float(np.mean(values == end))
             out.append(
-                f"{trial.name}: {share:.0%} of {name} is exactly {end:.4g}, its "
+                f"{trial.name}: {100.0 * share:.0f} % of {name} is exactly {end:.4g}, its "
                 f"{'largest' if end > 0.0 else 'least'} value; was the sensor at its end? What it "
                 "did not see is missing in every answer"
             )

@@ -144,7 +144,7 @@ def _rider(source: Source, table: Table, notes: Sequence[str] = ()) -> Instrumen
     if ground is not None:
         there = np.isfinite(ground)
         if there.mean() < SEEN:
-            said.append(f"{name}: the chair is seen in {there.mean():.0%} of the time")
+            said.append(f"{name}: the chair is seen in {100.0 * there.mean():.0f} % of the time")
         # a wheel of the usual radius; clocks are put together by its course alone
         speed = np.interp(time, time[there], ground[there]) / RADIUS
     return Instrument(
