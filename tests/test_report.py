@@ -358,6 +358,18 @@ def test_rivals_are_in_the_first_sentence():
     assert "**floor slope** or **rolling resistance**" in said
 
 
+def test_a_correction_that_is_less_probable_than_a_rival_says_why():
+    sets = [["rolling_resistance", "toe"]]
+    found = Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets)
+    found.probability = {"toe": 0.41, "rolling_resistance": 0.16, "rolling_resistance+wind": 0.02}
+    said = words.missing(found)
+    assert "with which it fits best; toe is more probable (41 % against 18 %)" in said
+    found.probability = {"rolling_resistance": 0.41, "toe": 0.18, "outside": 0.1}
+    assert "more probable" not in words.missing(found)
+    found.probability = {"outside": 0.41, "rolling_resistance": 0.18}
+    assert "more probable" not in words.missing(found)
+
+
 def test_alternatives_that_go_together_are_said_to():
     sets = [["rolling_resistance", "toe+air_drag", "none"]]
     found = Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets)

@@ -80,13 +80,30 @@ def _undecided(diagnosis: Diagnosis) -> str:
     )
     known = settled(diagnosis)
     others = [e for e in diagnosis.effects if e not in known]
-    chosen = "the correction has " + " and ".join(map(effect_words, others or known))
+    has = " and ".join(map(effect_words, others or known))
+    chosen = f"the correction has {has}{_though_less_probable(diagnosis)}"
     if not known or not others:
         return f"What is missing is {doubt}; {chosen}."
     there = of_effects(diagnosis.probability, [e.key for e in known])
     surely = "" if there >= PROBABLE else f"probably ({share(there)}), "
     first = _capital(f"{surely}{found_words(known)}")
     return f"{first}. Besides, what is missing is {doubt}; {chosen}."
+
+
+def _though_less_probable(diagnosis: Diagnosis) -> str:
+    """Why the correction has effects than which others are more probable; empty: none are."""
+    first, *others = explanations(diagnosis)
+    own = next((e for e in others if e.named), None)
+    if own is None or first.name in (NONE, OUTSIDE, ONE_RUN):
+        return ""
+    likely, less = (share(e.alone + e.more) for e in (first, own))
+    if likely == less:
+        return ""
+    return (
+        f", with which it fits best; {hypothesis_words(first.name)} is more probable ({likely} "
+        f"against {less}), since probability counts as well how common an effect is and how many "
+        "numbers it has"
+    )
 
 
 def _sets(alternatives: Sequence[Sequence[str]]) -> str:
