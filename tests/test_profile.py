@@ -93,13 +93,14 @@ def test_a_fit_that_is_not_stuck_is_left_as_it_is(stuck):
     assert profile.followed(BASE, begun) is begun
 
 
-def test_of_sizes_that_make_up_for_one_another_chi2_tells_the_errors(stuck):
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_of_sizes_that_make_up_for_one_another_chi2_tells_the_errors(stuck, sign):
     """Fits of one wind from four starts ended within 2 of chi2 and 4 standard errors apart."""
     begun = told(TRUTH, NAMES, promised=chi2(TRUTH))
     pair = frozenset(ParameterId("torque_gain", name) for name in NAMES)
-    loosely = replace(begun, correlation={pair: 0.8})
+    loosely = replace(begun, correlation={pair: 0.8 * sign})
     assert profile.followed(BASE, loosely) is loosely
-    end = profile.followed(BASE, replace(begun, correlation={pair: 0.97}))
+    end = profile.followed(BASE, replace(begun, correlation={pair: 0.97 * sign}))
     for key in pair:
         assert end.std[key] == pytest.approx(3.0 * begun.std[key], rel=0.1)  # chi2 hardly rises
     assert end.sigmas["torque_gain"] == pytest.approx(begun.sigmas["torque_gain"] / 3.0, rel=0.1)
