@@ -1094,3 +1094,35 @@ def test_a_single_effect_just_behind_several_or_the_best_one_is_fitted(
     first = SimpleNamespace(name="torque_gain", gain=best, score=best - 10.0)
     choice = SimpleNamespace(hypothesis=chosen)
     assert probable._may_be_better(single, [first, single], choice) is looked
+
+
+@pytest.mark.parametrize(
+    ("brings", "grown_from"),
+    [
+        (1900.0, True),  # 5 % behind the patch alone
+        (1500.0, False),
+    ],
+)
+def test_an_effect_of_a_whole_size_a_little_behind_is_grown_from_too(
+    monkeypatch, brings, grown_from
+):
+    """A patch of the floor stood for wheels that shimmied and were toed, and nothing was named."""
+    shimmy = hypothesis_of("relaxation_length", whole=True)
+    best = Tried(hypothesis_of("surface_patch"), SimpleNamespace(total=0.0))
+    other = Tried(hypothesis_of("toe"), SimpleNamespace(total=50.0))
+    whole = Tried(shimmy, SimpleNamespace(total=2000.0 - brings))
+    looking = SimpleNamespace(base=None, tried=[best, other, whole])
+    monkeypatch.setattr(forward_selection, "gain", lambda _, fitted: 2000.0 - fitted.total)
+    asked = []
+    monkeypatch.setattr(forward_selection, "beside", lambda _, tried: asked.append(tried))
+    monkeypatch.setattr(left_over, "of_size", lambda *_: None)
+    monkeypatch.setattr(forward_selection, "of_size", lambda *_: [])
+    looking.near = None
+    assert forward_selection.further(looking, best, 2) is None
+    assert asked == ([best, whole] if grown_from else [best])
+
+
+def hypothesis_of(name, whole=False):
+    """A single effect, with a size that small changes lead to, or with whole sizes."""
+    effect = SimpleNamespace(key=name, parameters=[SimpleNamespace(whole=(1.0,) if whole else ())])
+    return SimpleNamespace(keys=(name,), starts=[SimpleNamespace(effect=effect)])
