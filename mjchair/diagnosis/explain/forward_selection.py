@@ -75,11 +75,13 @@ def further(fits: Fits, best: Tried | None, size: int) -> WithGap | None:
     """
     if best is not None and fits.near is not None:
         return best_of(fits, promising(fits, best), patient=False)
-    top = None if best is None else better(beside(fits, best), left_over.of_size(fits, size))
-    for whole in _whole_ones_behind(fits, best) if best is not None else ():
-        top = better(top, beside(fits, whole))
-    if best is not None and _closes(top, best):
-        return top
+    top = None
+    if best is not None:
+        top = better(beside(fits, best), left_over.of_size(fits, size))
+        for whole in _whole_ones_behind(fits, best):
+            top = better(top, beside(fits, whole))
+        if _closes(top, best):
+            return top
     # Perhaps the first effect stands in for two others. Hypotheses that keep all effects of the
     # best are not fitted again here: they were weighed around its fit.
     but = () if best is None else best.hypothesis.keys
