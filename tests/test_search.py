@@ -1126,3 +1126,20 @@ def hypothesis_of(name, whole=False):
     """A single effect, with a size that small changes lead to, or with whole sizes."""
     effect = SimpleNamespace(key=name, parameters=[SimpleNamespace(whole=(1.0,) if whole else ())])
     return SimpleNamespace(keys=(name,), starts=[SimpleNamespace(effect=effect)])
+
+
+def test_what_is_fitted_beside_several_effects_is_held_against_the_best_of_as_many(monkeypatch):
+    """Beside two effects that were well fitted no single one seemed worth a second start."""
+    tried = [
+        Tried(hypothesis_of("toe"), SimpleNamespace(total=1050.0)),
+        Tried(hypothesis_of("torque_gain"), SimpleNamespace(total=1040.0)),
+    ]
+    asked = []
+    looking = SimpleNamespace(tried=tried, fit=lambda _, best: asked.append(best))
+    pair = SimpleNamespace(starts=(1, 2))
+    single = hypothesis_of("mass_offset")
+    monkeypatch.setattr(probable, "_not_yet_fitted", lambda *_: [single, pair])
+    monkeypatch.setattr(probable, "better_of", lambda *_: None)
+    several = SimpleNamespace(hypothesis=pair, fitted=SimpleNamespace(total=1000.0))
+    probable.better_than(looking, several)
+    assert asked == [tried[1], Tried(pair, several.fitted)]
