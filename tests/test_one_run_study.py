@@ -9,6 +9,9 @@ import mjchair
 from mjchair.diagnosis import decide
 from mjchair.diagnosis.data.study import Run, make_study
 from mjchair.diagnosis.diagnose import diagnose
+from mjchair.diagnosis.fit.column_ids import ParameterId
+from mjchair.diagnosis.fit.nonlinear import refit
+from mjchair.diagnosis.fit.variant import Term
 from mjchair.diagnosis.rules import Verdict
 from mjchair.effects.library import find
 from mjchair.measurement.trial import Trial
@@ -71,3 +74,19 @@ def test_it_shows_though_all_runs_together_scatter_like_noise(found, monkeypatch
     base, gap = found.stages.base, replace(found.stages.gap, p=1e-5, excess=0.0)
     said = decide.conclude(base, gap, None)
     assert said.verdict == Verdict.UNKNOWN and said.one_run.trial == "b"
+
+
+def test_two_sizes_of_an_effect_are_as_alike_as_their_columns_leave_them(found):
+    """By the inverse of what all windows tell, with the priors of what is only roughly known."""
+    base = found.stages.base
+    effect = next(s.effect for s in base.starts if s.free == ("left", "right"))
+    term = Term(effect, {"left": 0.002, "right": 0.001}, ("left", "right"))
+    variant = replace(base.plain.variant, terms=(term,))
+    fitted = refit(base.bench, variant, base.plain.track, base.nuisances, rounds=0)
+    system = fitted.system
+    priors = np.diag([float(k < system.nuisance) for k in range(len(system.columns))])
+    known = np.linalg.inv(priors + sum(system.G[i] for i in base.bench.windows))
+    left, right = (system.places[ParameterId(effect.key, name)] for name in term.free)
+    together = known[left, right] / np.sqrt(known[left, left] * known[right, right])
+    assert abs(together) > 0.05
+    assert list(fitted.correlation.values()) == [pytest.approx(together, rel=0.05)]
