@@ -121,6 +121,11 @@ def with_unit(value: float | str, unit: str) -> str:
     return told if unit in ("", "1") else f"{told} {unit}"
 
 
+def per_cent(share: float) -> str:
+    """A share as it is written everywhere: "94 %" of 0.94."""
+    return f"{100.0 * share:.0f} %"
+
+
 def factor(unit: str) -> float:
     """What a number in a unit of UNITS is multiplied by to be in SI; 1 for no unit."""
     return UNITS[unit][1] if unit else 1.0

@@ -1124,7 +1124,7 @@ def test_an_effect_of_a_whole_size_a_little_behind_is_grown_from_too(
 
 def hypothesis_of(name, whole=False):
     """A single effect, with a size that small changes lead to, or with whole sizes."""
-    effect = SimpleNamespace(key=name, parameters=[SimpleNamespace(whole=(1.0,) if whole else ())])
+    effect = SimpleNamespace(key=name, fitted=[SimpleNamespace(whole=(1.0,) if whole else ())])
     return SimpleNamespace(keys=(name,), starts=[SimpleNamespace(effect=effect)])
 
 

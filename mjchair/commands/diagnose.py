@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from mjchair.commands import options
 from mjchair.errors import MjchairError, note
+from mjchair.units import per_cent
 
 if TYPE_CHECKING:
     from mjchair.diagnosis.data.study import Study
@@ -214,8 +215,8 @@ def _likely(found: Diagnosis) -> str:
         return ""
     if found.effects:
         likely = of_effects(found.probability, [e.key for e in found.effects])
-        return f"; probability {100.0 * likely:.0f} %"
+        return f"; probability {per_cent(likely)}"
     nothing = found.probability.get(NONE, 0.0)
     if nothing < LIKELY:
         return "; what is left is too small to matter"
-    return f"; probability that nothing is missing {100.0 * nothing:.0f} %"
+    return f"; probability that nothing is missing {per_cent(nothing)}"

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from mjchair.commands import options
 from mjchair.errors import MjchairError
+from mjchair.units import per_cent
 
 if TYPE_CHECKING:
     from mjchair.identification.causes import Verdict
@@ -110,7 +111,7 @@ def _notes(tire_fit: Fit) -> None:
         note(f"{len(far) - MOST_NAMED} more rows are as far from the fit")
     if tire_fit.unexplained > LARGE_RESIDUAL:
         note(
-            f"the residual of the fit is {100.0 * tire_fit.unexplained:.0f} % of the force; the "
+            f"the residual of the fit is {per_cent(tire_fit.unexplained)} of the force; the "
             "tire follows these data badly"
         )
 
@@ -122,7 +123,7 @@ def report(tire_fit: Fit, verdict: Verdict, others: list[Fit]) -> str:
     lines = [
         f"{tire_fit.curve.family} fitted to {len(tire_fit.table)} runs of {tire_fit.table.source}: "
         f"noise {tire_fit.noise:.2g} N, {tire_fit.effective:.1f} parameters' worth of data used, "
-        f"{100 * tire_fit.reached:.0f} % of the starts ended here.",
+        f"{per_cent(tire_fit.reached)} of the starts ended here.",
         "",
         "parameter      value        standard error",
     ]

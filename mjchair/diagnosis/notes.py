@@ -23,6 +23,7 @@ from mjchair.diagnosis.result import MissingForce
 from mjchair.diagnosis.rules import Verdict
 from mjchair.effects.effect import SensorError
 from mjchair.effects.left_and_right import DIFFERENCE, SIDES
+from mjchair.units import per_cent
 
 FAR_GAIN = 2.0  # standard deviations of a sensor's gain, from which it is told
 NEAR = 1.5  # times the noise that was given: of what is nearer nothing is said
@@ -109,7 +110,7 @@ def no_answer(choice: Choice, stands: rules.Standing) -> str:
     names = " and ".join(t.effect.key for t in choice.fitted.variant.terms)
     nearest = (
         f"nothing in the library explains the gap; the nearest, {names}, closes "
-        f"{100.0 * stands.closure:.0f} % of it on the runs that it was fitted to"
+        f"{per_cent(stands.closure)} of it on the runs that it was fitted to"
     )
     held = stands.held_out
     if held is None or not rules.opens_a_gap(held):
@@ -143,7 +144,7 @@ def _numbers(count: int) -> str:
 
 def of_event(once: event.Event, share: float) -> str:
     """A note on an event that alone brings this share of what any test shows."""
-    of_all = f"{100.0 * share:.0f} % of what any test shows"
+    of_all = f"{per_cent(share)} of what any test shows"
     if once.whole:
         return f"it may be pushes that nobody measured: forces in {once.trial} alone bring {of_all}"
     return (

@@ -27,6 +27,7 @@ from mjchair.identification.curves import Curve, Parameter, curve, driven
 from mjchair.measurement.rig import RigTable
 from mjchair.tire import Tire
 from mjchair.tire.tire import block_forces, block_of
+from mjchair.units import per_cent
 
 Array = NDArray[np.float64]
 
@@ -202,8 +203,8 @@ class Fit:
         """
         if self.unexplained > MOST_RESIDUAL:
             raise MjchairError(
-                f"{self.table.source}: the residual of the fit is {100.0 * self.unexplained:.0f} % "
-                f"of the force, and of a tire it must be below {100.0 * MOST_RESIDUAL:.0f} %; are "
+                f"{self.table.source}: the residual of the fit is {per_cent(self.unexplained)} "
+                f"of the force, and of a tire it must be below {per_cent(MOST_RESIDUAL)}; are "
                 "slip angle, load and force of one run in each row, and in their units?"
             )
         not_measured = {

@@ -31,6 +31,7 @@ from mjchair.measurement.stretches import stretches
 from mjchair.measurement.trial import Trial
 from mjchair.simulation.inputs import Inputs
 from mjchair.simulation.table import frozen
+from mjchair.units import per_cent
 
 Array = NDArray[np.float64]
 
@@ -256,7 +257,7 @@ def at_its_end(run: PushRim) -> list[str]:
                 unit = "N" if name.startswith("F") else "N m"
                 out.append(
                     f"{Path(run.source).name}: {name} is {end:.2f} {unit} in "
-                    f"{100.0 * at.mean():.0f} % of the samples and never beyond: a sensor at its "
+                    f"{per_cent(at.mean())} of the samples and never beyond: a sensor at its "
                     "end tells less than was there"
                 )
     return out

@@ -34,6 +34,7 @@ from mjchair.report.diagnosis_figures import (
     where,
     whole_runs,
 )
+from mjchair.units import per_cent
 
 TEMPLATE = "diagnosis.html"
 CANDIDATES = 14  # rows of the table
@@ -230,7 +231,7 @@ def _candidate(c: Candidate, closes: bool, alike: bool) -> list[str]:
         _signature(c),
         f"{c.detectability:.1f}",
         f"{c.held_out_gain:,.0f}",
-        *([f"{100.0 * c.closure:.0f} %"] if closes else []),
+        *([per_cent(c.closure)] if closes else []),
         *([f"{c.collinear:.2f}"] if alike else []),
     ]
 
@@ -260,7 +261,7 @@ def _effects(diagnosis: Diagnosis) -> Table:
                 diagnosis_words.open_upwards(p) or f"{p.value:.4g}",
                 "held" if p.std is None else f"{p.std:.2g}",
                 p.unit,
-                f"{100.0 * e.closure:.0f} %",
+                per_cent(e.closure),
             ]
         )
         for e in diagnosis.effects

@@ -26,7 +26,7 @@ from mjchair.diagnosis.result import (
     OneRun,
 )
 from mjchair.diagnosis.rules import LEVEL, LIKELY, PARTLY, PROBABLE, Verdict
-from mjchair.units import with_unit
+from mjchair.units import per_cent, with_unit
 
 LEAST = 1e-6  # a chance below this is said to be below it
 # what a force may go with that is not known where nothing tells how the chair turns
@@ -201,7 +201,7 @@ def remainder_words(diagnosis: Diagnosis) -> str:
     only = f" only with {ends} as far from the chair of the study as is believed" if ends else ""
     after = diagnosis.gap.after if diagnosis.gap else None
     left = f", and a remainder is left{goes}" if not ends or after is None or after > 1.0 else ""
-    share_closed = f"{100.0 * closed:.0f} %" if closed < ALL else "nearly all"
+    share_closed = per_cent(closed) if closed < ALL else "nearly all"
     explains = f"that explains {share_closed} of the gap{_held_out(diagnosis)}{only}{left}"
     return f"More is missing than what is named here: {explains}. "
 
@@ -455,7 +455,7 @@ def choice_words(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == Verdict.AMBIGUOUS:
         return _open_words(diagnosis)
     rules = (
-        f"None is named. An answer closes at least {100.0 * PARTLY:.0f} % of the gap and holds on "
+        f"None is named. An answer closes at least {per_cent(PARTLY)} of the gap and holds on "
         f"{other_runs(diagnosis)}; no effect, nor two or three together, does both. "
     )
     if diagnosis.one_run is not None:
@@ -470,9 +470,7 @@ def _open_words(diagnosis: Diagnosis) -> str:
     likely = of_effects(diagnosis.probability, [e.key for e in diagnosis.effects])
     if likely < PROBABLE:
         told = min(likely, PROBABLE - 0.01)  # 94.6 % is no 95 %
-        return (
-            f"It is one explanation that fits. Its probability is {100.0 * told:.0f} %, below 95 %."
-        )
+        return f"It is one explanation that fits. Its probability is {per_cent(told)}, below 95 %."
     return (
         "It is one explanation that fits. What it leaves, or how well its numbers are known, is "
         "not enough to name it."
@@ -488,7 +486,7 @@ def nearest_words(diagnosis: Diagnosis) -> str:
     gap = diagnosis.gap
     held = " on the held-out ones" if gap is not None and gap.held_out else ""
     return (
-        f"The nearest, {names}, closes {100.0 * near.closure:.0f} % of the gap on the runs that it "
+        f"The nearest, {names}, closes {per_cent(near.closure)} of the gap on the runs that it "
         f"was fitted to and leaves {size(near.remainder)} times the noise{held}. "
     )
 
@@ -599,7 +597,7 @@ def chance(p: float) -> str:
 
 def share(p: float) -> str:
     """A probability as a share of cases."""
-    return f"{100 * p:.0f} %" if p >= 0.01 else f"{100 * p:.1g} %"
+    return per_cent(p) if p >= 0.01 else f"{100 * p:.1g} %"
 
 
 def size(ratio: float) -> str:

@@ -23,6 +23,7 @@ from mjchair.testlab.drive import STILL, Joystick, Person, Pilot, drive_of, pilo
 from mjchair.testlab.result import Result, Value
 from mjchair.testlab.track import Command, Run, Track, View
 from mjchair.tire import block
+from mjchair.units import per_cent
 
 NAME = "energy"
 CARPET = 0.0118  # 1, Hoffman 2003
@@ -127,7 +128,7 @@ def _motors(design: Design, drive: Joystick, timestep: float | None) -> Result:
         values,
         setup=[
             f"laps of two straights of {STRAIGHT:g} m and two half turns, once each way round",
-            f"battery {drive.battery:.0f} Wh, {100 * USED:.0f} % used",
+            f"battery {drive.battery:.0f} Wh, {per_cent(USED)} used",
             drive.describe(),
         ],
         curves=curves,

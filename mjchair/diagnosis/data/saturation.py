@@ -12,6 +12,7 @@ from mjchair.diagnosis.data.study import Study
 from mjchair.diagnosis.data.trial_checks import STAYS
 from mjchair.measurement.trial import Trial
 from mjchair.simulation.table import Array
+from mjchair.units import per_cent
 
 SHARE = 0.02  # of the samples, at the end, from which on it is said (assumption)
 VALUES = 30  # different values of a column at least: one that has fewer is coarse
@@ -36,7 +37,7 @@ def _of_run(trial: Trial, torque_measured: bool) -> list[str]:
         for end in _ends(values):
             share = float(np.mean(values == end))
             out.append(
-                f"{trial.name}: {100.0 * share:.0f} % of {name} is exactly {end:.4g}, its "
+                f"{trial.name}: {per_cent(share)} of {name} is exactly {end:.4g}, its "
                 f"{'largest' if end > 0.0 else 'least'} value; was the sensor at its end? What it "
                 "did not see is missing in every answer"
             )

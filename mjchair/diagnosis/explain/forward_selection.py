@@ -7,7 +7,7 @@ grows as long as it leaves a gap and a further effect is worth it.
 from __future__ import annotations
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import alternatives, left_over
+from mjchair.diagnosis.explain import alternatives, left_over, whole_sizes
 from mjchair.diagnosis.explain.choice import Tried
 from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.screening import gain, goes_far
@@ -115,7 +115,7 @@ def _whole_ones_behind(fits: Fits, best: Tried) -> list[Tried]:
         for t in fits.tried
         if t.hypothesis.keys != best.hypothesis.keys
         and len(t.hypothesis.starts) == 1
-        and any(p.whole for p in t.hypothesis.starts[0].effect.parameters)
+        and whole_sizes.parameter_of(t.hypothesis.starts[0].effect) is not None
         and rules.is_just_behind(gain=gain(fits.base, t.fitted), best=brings)
     ]
 

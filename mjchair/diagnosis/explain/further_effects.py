@@ -74,7 +74,7 @@ def without_hidden(fits: Fits) -> Fits:
     fits.say("what passes for noise")
     here = _first(fits)
     # small changes do not lead to an effect of a whole size: the search would not find it again
-    whole = any(p.whole for s in here.starts for p in s.effect.parameters)
+    whole = any(whole_sizes.parameter_of(s.effect) for s in here.starts)
     done = whole and whole_sizes.shimmies(base)  # what it leaves of a shimmy is no further effect
     while not done and len(here.starts) < rules.MOST and noise_shown.loudness(here.bench) > LOUD:
         further = _further(base, here)

@@ -64,10 +64,9 @@ class MultiStart:
         first = self._from(1.0)
         if self.near is not None:
             return self._or_from_afar(first)
-        promised = self.base.reduced.total - self.hypothesis.gain
         many = len(self.hypothesis.starts) > 1 and self.best is not None  # one start is enough
         short = first is None or rules.fell_short(
-            total=first.total, promised=promised, gain=self.hypothesis.gain
+            total=first.total, promised=self._promised, gain=self.hypothesis.gain
         )
         if first is not None and (many or not short or self._is_hopeless(first)):
             return first
@@ -196,6 +195,11 @@ class MultiStart:
         """Whether a fit ends, by its own promise, too far behind the best to come near it."""
         return fitted.promised > self._reach()
 
+    @property
+    def _promised(self) -> float:
+        """Chi2 that linear algebra around the chair without effects promises."""
+        return self.base.reduced.total - self.hypothesis.gain
+
     def _is_hopeless(self, fitted: Fitted) -> bool:
         """Whether a fit that ends too far behind the best is not started again elsewhere.
 
@@ -206,10 +210,9 @@ class MultiStart:
         base, best = self.base, self.best
         if best is None or not self._is_behind(fitted):
             return False
-        promised = base.reduced.total - self.hypothesis.gain
         return not rules.may_be_as_good(
             promised=self.behind,
-            behind=promised - best.total,
+            behind=self._promised - best.total,
             gain=self.hypothesis.gain,
             brought=gain(base, best),
         )

@@ -51,7 +51,7 @@ def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitte
     touchy = replace(base.around.track, touchy=frozenset(_worst_windows(base)))
     seen = set()
     for start in base.starts:
-        p = _parameter(start.effect)
+        p = parameter_of(start.effect)
         if p is None or start.effect.key in seen:
             continue
         seen.add(start.effect.key)
@@ -101,12 +101,12 @@ def _beside(base: Base, fitted: Fitted) -> Iterator[Fitted]:
 def _whole(fitted: Fitted) -> Iterator[tuple[int, Term, Parameter]]:
     """The effects of a fit whose whole sizes are free: place, effect, parameter."""
     for k, term in enumerate(fitted.variant.terms):
-        p = _parameter(term.effect)
+        p = parameter_of(term.effect)
         if p is not None and p.name in term.free:
             yield k, term, p
 
 
-def _parameter(effect: Effect) -> Parameter | None:
+def parameter_of(effect: Effect) -> Parameter | None:
     """The parameter of an effect that has whole sizes; None: it has none."""
     return next((p for p in effect.fitted if p.whole), None)
 

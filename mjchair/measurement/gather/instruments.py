@@ -25,6 +25,7 @@ from mjchair.measurement.torque import check_torques
 from mjchair.rider.anatomy import JOINT_NAMES
 from mjchair.simulation.inputs import OTHER_COLUMNS
 from mjchair.simulation.table import Table, check_units, read_table
+from mjchair.units import per_cent
 
 Array = NDArray[np.float64]
 
@@ -144,7 +145,7 @@ def _rider(source: Source, table: Table, notes: Sequence[str] = ()) -> Instrumen
     if ground is not None:
         there = np.isfinite(ground)
         if there.mean() < SEEN:
-            said.append(f"{name}: the chair is seen in {100.0 * there.mean():.0f} % of the time")
+            said.append(f"{name}: the chair is seen in {per_cent(there.mean())} of the time")
         # a wheel of the usual radius; clocks are put together by its course alone
         speed = np.interp(time, time[there], ground[there]) / RADIUS
     return Instrument(
