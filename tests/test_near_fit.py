@@ -81,7 +81,7 @@ def test_what_is_new_begins_at_its_linear_value_and_the_rest_stays(problem):
     assert terms[1].values["size"] == pytest.approx(best[1], rel=1e-6)
 
 
-SMALL = SimpleNamespace(effect=SimpleNamespace(parameters=()))
+SMALL = SimpleNamespace(effect=SimpleNamespace(fitted=()))
 
 
 def test_a_place_is_not_set_back_with_what_stands_there():
@@ -151,7 +151,7 @@ def test_noise_gives_way_to_effects_that_earn_it(monkeypatch, power, price, quie
         assert found.starts == more.starts
 
 
-WHOLE = SimpleNamespace(effect=SimpleNamespace(parameters=(SimpleNamespace(whole=(0.3,)),)))
+WHOLE = SimpleNamespace(effect=SimpleNamespace(fitted=(SimpleNamespace(whole=(0.3,)),)))
 
 
 @pytest.mark.parametrize(
