@@ -1,11 +1,17 @@
-"""Where a nonlinear fit begins, on totals that are told: nothing is simulated."""
+"""Where a nonlinear fit begins, on totals that are told, and its standard errors by the other side.
+
+Nothing is simulated.
+"""
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from mjchair.diagnosis.fit import nonlinear
-from mjchair.diagnosis.fit.nonlinear import ASTRAY, NEARER, Placed, refit
+from mjchair.diagnosis.fit.column_ids import ParameterId
+from mjchair.diagnosis.fit.nonlinear import ASTRAY, NEARER, Placed, from_other_side, refit
+from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.effects.effect import Effect, Parameter
 
@@ -43,3 +49,31 @@ def test_an_effect_that_linear_algebra_makes_far_too_large_begins_smaller(
     assert found.variant.terms[0].values["length"] == pytest.approx(share)
     as_it_was = refit(bench, start, None, {})
     assert as_it_was.variant.terms[0].values["length"] == 1.0
+
+
+@pytest.mark.parametrize("smaller", [0.5, 1.0, 4.0])
+def test_columns_of_the_other_side_tell_their_own_standard_errors(smaller, monkeypatch):
+    """Four samples that move by the noise for a typical change tell half of it."""
+    key, slope = ParameterId("trail", "length"), {1.0: 1.0, -1.0: smaller}
+
+    def columns(bench, track, variant, known=None, side=1.0):
+        return {key: [np.full((4, 1), slope[side])]}
+
+    def system(track, columns, count, variant, only=None):
+        (column,) = columns[key]
+        power = float((column**2).sum())
+        return System(
+            columns=[key], nuisance=0, G=np.full((1, 1, 1), power), b=np.zeros((1, 1)),
+            c=np.zeros(1), run=np.zeros(1, int), back=np.zeros(0),
+        )  # fmt: skip
+
+    monkeypatch.setattr(nonlinear, "term_columns", columns)
+    bench = SimpleNamespace(system=system, windows=np.array([0]))
+    fitted = SimpleNamespace(
+        variant=Variant((), terms=(Term(TRAIL, {"length": 0.1}, ("length",)),)),
+        columns=columns(bench, None, None),
+        track=None,
+        std={key: 0.005},
+        system=SimpleNamespace(nuisance=0),
+    )
+    assert from_other_side(bench, fitted) == {key: pytest.approx(0.005 / smaller, rel=1e-6)}

@@ -68,6 +68,7 @@ def stuck(monkeypatch):
         return told(sizes, term.free, promised=min(total, 3000.0))
 
     monkeypatch.setattr(multistart, "refit", refit)
+    monkeypatch.setattr(profile, "from_other_side", lambda _, fitted: fitted.std)
 
 
 def valley(at):
@@ -106,6 +107,24 @@ def test_of_sizes_that_make_up_for_one_another_chi2_tells_the_errors(stuck, sign
     assert end.sigmas["torque_gain"] == pytest.approx(begun.sigmas["torque_gain"] / 3.0, rel=0.1)
 
 
+@pytest.mark.parametrize(("ratio", "asked"), [(0.5, True), (1.2, False), (2.0, True)])
+def test_where_two_sides_say_different_errors_chi2_tells_them(stuck, monkeypatch, ratio, asked):
+    """A column that is taken across a jump told a camber eight times as well as it was known."""
+    left, right = (ParameterId("torque_gain", name) for name in NAMES)
+    begun = told(TRUTH, NAMES, promised=chi2(TRUTH))
+    other = {left: ratio * begun.std[left], right: begun.std[right]}
+    monkeypatch.setattr(profile, "from_other_side", lambda *_: other)
+    end = profile.followed(BASE, begun)
+    if not asked:
+        assert end is begun
+        return
+    away = profile.AWAY * max(other[left], begun.std[left])
+    best = min(chi2(np.add(TRUTH, (away, b))) for b in np.linspace(-0.1, 0.1, 2001)) - chi2(TRUTH)
+    assert end.std[left] == pytest.approx(away / math.sqrt(max(best, 1.0)), rel=0.01)
+    assert end.std[right] == begun.std[right]
+    assert end.sigmas["torque_gain"] == pytest.approx(40.0 * begun.std[left] / end.std[left])
+
+
 def test_a_number_that_is_no_size_is_known_no_better_than_what_makes_up_for_it():
     wind = find("wind")
     x, area = (ParameterId("wind", name) for name in ("x", "drag_area"))
@@ -127,6 +146,7 @@ def test_where_no_chair_is_beside_it_a_fit_stays(monkeypatch):
         raise MjchairError("no chair")
 
     monkeypatch.setattr(multistart, "refit", never)
+    monkeypatch.setattr(profile, "from_other_side", never)
     begun = told(valley(-0.3), NAMES, promised=3000.0)
     end = profile.followed(BASE, begun)
     assert end.total == begun.total and end.std == begun.std

@@ -35,6 +35,10 @@ def test_a_derivative_is_taken_over_a_few_standard_errors(at, std, by):
     beside, factor = nudged(Variant((), terms=(term,)), term, LEFT, std)
     assert beside.terms[0].values["left"] - at == pytest.approx(by)
     assert factor * by == pytest.approx(LEFT.change)
+    other, factor = nudged(Variant((), terms=(term,)), term, LEFT, std, side=-1.0)
+    away = other.terms[0].values["left"] - at
+    assert away == pytest.approx(-abs(by))  # no bound is in the way there
+    assert factor * away == pytest.approx(LEFT.change)
 
 
 def test_a_drag_is_no_rounding_where_channels_are_precise_and_the_chair_is_shaken():

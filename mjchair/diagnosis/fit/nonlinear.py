@@ -12,6 +12,7 @@ neither converges.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations
@@ -279,11 +280,9 @@ def _around(
     step, _ = bounded.solve_nuisances(system, bench.windows, outside)
     system.set_cells(step[:count])  # of this very variant: nothing else of it is moved
     covariance = bounded.covariance(system, bench.windows)
-    std, correlation = {}, {}
+    std = _standard_errors(variant, system, covariance)
+    correlation = {}
     for term in variant.terms:
-        for key, p in term.parameters:
-            k = system.places[key]
-            std[key] = float(np.sqrt(max(covariance[k, k], 0.0))) * p.change
         for (one, p), (other, q) in combinations(term.parameters, 2):
             together = covariance[system.places[one], system.places[other]] * p.change * q.change
             sizes = max(std[one] * std[other], 1e-300)
@@ -303,6 +302,35 @@ def _around(
         at_bound=tuple(key for term in variant.terms for key in on_bound(term)),
         correlation=correlation,
     )
+
+
+def from_other_side(bench: Bench, fitted: Fitted) -> dict[ParameterId, float]:
+    """Standard errors with columns that are taken to smaller values instead of to larger ones.
+
+    Where a caster is about to lift, or a wheel to slide, a column to one side is of a motion that
+    the other side does not have.
+
+    Raises:
+      MjchairError: a variant beside the fit does not compile, or its simulation fails.
+    """
+    variant, columns = fitted.variant, dict(fitted.columns)
+    columns.update(term_columns(bench, fitted.track, variant, fitted.std, side=-1.0))
+    columns.update(shared_columns(variant, columns))
+    _check_finite(columns.values(), variant)
+    count = fitted.system.nuisance
+    system = bench.system(fitted.track, columns, count, variant, only=bench.windows)
+    return _standard_errors(variant, system, bounded.covariance(system, bench.windows))
+
+
+def _standard_errors(
+    variant: Variant, system: System, covariance: Array
+) -> dict[ParameterId, float]:
+    """Standard errors of the free parameters, SI."""
+    return {
+        key: math.sqrt(max(covariance[system.places[key], system.places[key]], 0.0)) * p.change
+        for term in variant.terms
+        for key, p in term.parameters
+    }
 
 
 def _check_finite(columns: Iterable[Column], variant: Variant) -> None:

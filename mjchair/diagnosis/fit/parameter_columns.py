@@ -121,12 +121,17 @@ def _beside(variant: Variant, nuisance: Nuisance, part: float) -> Variant:
 
 
 def term_columns(
-    bench: Bench, track: Track, variant: Variant, known: Mapping[ParameterId, float] | None = None
+    bench: Bench,
+    track: Track,
+    variant: Variant,
+    known: Mapping[ParameterId, float] | None = None,
+    side: float = 1.0,
 ) -> dict[ColumnId, Column]:
     """One column a free parameter of the variant's effects, in units of its typical change.
 
     Args:
       known: standard errors of parameters, SI, from a fit near by; None: there is none.
+      side: to which a parameter is moved, 1 to larger values, -1 to smaller ones.
     """
     simulator = bench.simulator
     errors = variant.sensor_errors(simulator.channels)
@@ -140,7 +145,7 @@ def term_columns(
                     simulator, track, effect.sensor, str(effect.channel), parameter.change
                 )
                 continue
-            beside, factor = nudged(variant, term, parameter, (known or {}).get(key))
+            beside, factor = nudged(variant, term, parameter, (known or {}).get(key), side)
             unchanged = simulator.without_motion(effect.measured)
             points[key] = Point(beside.edit, factor, unchanged=unchanged)
     if points:

@@ -83,7 +83,11 @@ class Variant:
 
 
 def nudged(
-    variant: Variant, term: Term, parameter: Parameter, std: float | None = None
+    variant: Variant,
+    term: Term,
+    parameter: Parameter,
+    std: float | None = None,
+    side: float = 1.0,
 ) -> tuple[Variant, float]:
     """A variant with one parameter a little aside, and its typical change over that little.
 
@@ -92,10 +96,12 @@ def nudged(
 
     Args:
       std: standard error of the parameter; None: not known yet.
+      side: 1 to larger values, -1 to smaller ones; to the other side where a bound is in the way.
     """
     by = NUDGE * parameter.change
     if std is not None:
         by = min(by, max(ERRORS * std, LEAST * parameter.change))
+    by *= side
     value = term.values[parameter.name]
     if not parameter.low <= value + by <= parameter.high:
         by = -by
