@@ -152,10 +152,30 @@ def test_what_shakes_harder_than_it_can_is_left_in_the_gap():
         drawn,
         first,
         np.full((2, len(EDGES)), 1e-4),
-        most={Part.DRIVE_FAST: 0.7, Part.DRIVE_SLOW: 0.7, Part.PERSON: 0.0},
+        most={
+            part: np.full(RUNS, most)
+            for part, most in ((Part.DRIVE_FAST, 0.7), (Part.DRIVE_SLOW, 0.7), (Part.PERSON, 0.0))
+        },
     )
     assert held.parts[Part.DRIVE_FAST].max() == pytest.approx(0.7)
     assert held.parts[Part.YAW_FAST].max() > 0.4
+
+
+@pytest.mark.parametrize(("turns", "told"), [(1e-5, False), (1.0, True)])
+def test_a_level_that_no_number_tells_does_not_wander(turns, told):
+    """Where casters hardly turned, a force once a turn went from nearly nothing to 1.9 N."""
+    drawn = windows(np.random.default_rng(1))
+    drawn[0].correlations[Part.CASTER_TURN] *= turns  # which all windows share
+    first = Levels(  # the last run is held out
+        parts={part: np.full(RUNS + 1, kind.first) for part, kind in KINDS.items()},
+        wobbles={},
+        bands=np.ones((2, len(EDGES))),
+    )
+    most = {part: np.full(RUNS + 1, 5.0) for part in KINDS}
+    shown = noise_levels.estimate(drawn, first, np.full((2, len(EDGES)), 1e-4), most=most)
+    quiet = shown.parts[Part.CASTER_TURN] == pytest.approx(noise_levels.UNTOLD * 5.0)
+    assert quiet != told
+    assert np.median(shown.parts[Part.YAW_FAST]) == pytest.approx(0.6, rel=0.15)
 
 
 def test_the_cosines_of_a_window_are_orthonormal():
