@@ -364,6 +364,10 @@ def test_a_correction_that_is_less_probable_than_a_rival_says_why():
     found.probability = {"toe": 0.41, "rolling_resistance": 0.16, "rolling_resistance+wind": 0.02}
     said = words.missing(found)
     assert "with which it fits best; toe is more probable (41 % against 18 %)" in said
+    found.probability["sensor_bias:heading+wind"] = 0.5
+    said = words.missing(found)
+    assert "best; sensor bias of heading and wind are more probable (50 % against 18 %)" in said
+    del found.probability["sensor_bias:heading+wind"]
     found.probability = {"rolling_resistance": 0.41, "toe": 0.18, "outside": 0.1}
     assert "more probable" not in words.missing(found)
     found.probability = {"outside": 0.41, "rolling_resistance": 0.18}

@@ -35,7 +35,7 @@ def clear(line: dict) -> bool:
 
 def named(line: dict) -> set[str]:
     """Names that a verdict states without an alternative."""
-    return {e["name"] for e in line["effects"]} if line["verdict"] == "named" else set()
+    return put_first(line) if line["verdict"] == "named" else set()
 
 
 def returned(line: dict) -> set[str]:
@@ -43,12 +43,17 @@ def returned(line: dict) -> set[str]:
     if line["verdict"] not in ("named", "ambiguous"):
         return set()
     rivals = {n for g in line["alternatives"] for names in g for n in names.split("+")}
-    return {e["name"] for e in line["effects"]} | rivals
+    return put_first(line) | rivals
 
 
 def first(line: dict) -> str:
     """The name a verdict puts first."""
     return line["effects"][0]["name"] if line["effects"] else ""
+
+
+def put_first(line: dict) -> set[str]:
+    """All names of the answer that a verdict puts first, with rivals or without."""
+    return {e["name"] for e in line["effects"]}
 
 
 def alone(line: dict) -> bool:
@@ -177,6 +182,7 @@ def table(lines: Sequence[dict]) -> str:
         ("below that: named, and right", "", faint, lambda x: bool(named(x)) and not wrong(x)),
         ("below that: named, and wrong", "", faint, wrong),
         ("both of two effects named", ">= 85 %", two, lambda x: truth(x) <= named(x)),
+        ("both of two effects first, named or not", "", two, lambda x: truth(x) == put_first(x)),
         ("both of two effects in the returned sets", "", two, kept),
         ("nothing hidden: verdict `none`", ">= 95 %", none, lambda x: x["verdict"] == "none"),
         ("what was hidden is in the 95 % set of hypotheses", "93-97 %", told, in_95_set),

@@ -199,7 +199,7 @@ def _drivers(diagnosis: Diagnosis) -> Table:
         Row(
             [
                 names.get(d.force, d.force),
-                diagnosis_words.plain_name(str(d.goes_with)),
+                plain(str(d.goes_with)),
                 f"{d.sigmas:.1f}",
             ]
         )
@@ -227,7 +227,7 @@ def _candidate(c: Candidate, closes: bool, alike: bool) -> list[str]:
     """Cells of an effect, with the share that it closes and its likeness where these are shown."""
     on = f" ({c.channel})" if c.channel else ""
     return [
-        diagnosis_words.plain_name(c.name) + on,
+        plain(c.name) + on,
         _signature(c),
         f"{c.detectability:.1f}",
         f"{c.held_out_gain:,.0f}",
@@ -256,8 +256,8 @@ def _effects(diagnosis: Diagnosis) -> Table:
     rows = [
         Row(
             [
-                diagnosis_words.plain_name(e.name) + (f" ({e.channel})" if e.channel else ""),
-                diagnosis_words.plain_name(name),
+                plain(e.name) + (f" ({e.channel})" if e.channel else ""),
+                plain(name),
                 diagnosis_words.open_upwards(p) or f"{p.value:.4g}",
                 "held" if p.std is None else f"{p.std:.2g}",
                 p.unit,

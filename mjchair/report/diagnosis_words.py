@@ -99,8 +99,9 @@ def _though_less_probable(diagnosis: Diagnosis) -> str:
     likely, less = (share(e.alone + e.more) for e in (first, own))
     if likely == less:
         return ""
+    verb = "are" if "+" in first.name else "is"
     return (
-        f", with which it fits best; {hypothesis_words(first.name)} is more probable ({likely} "
+        f", with which it fits best; {hypothesis_words(first.name)} {verb} more probable ({likely} "
         f"against {less}), since probability counts as well how common an effect is and how many "
         "numbers it has"
     )
@@ -343,7 +344,7 @@ def hypothesis_words(name: str) -> str:
         OUTSIDE: "something outside the library",
         ONE_RUN: "an effect in one run alone",
     }
-    return known.get(name, " and ".join(plain_name(n) for n in name.split("+")))
+    return known.get(name, " and ".join(plain(n) for n in name.split("+")))
 
 
 def next_step(diagnosis: Diagnosis) -> str:
@@ -399,7 +400,7 @@ def regime(diagnosis: Diagnosis, cell: Disagreement) -> str:
     """How the chair moved where it disagrees, as far as that is known."""
     turns = diagnosis.evidence is None or diagnosis.evidence.turns
     known = {k: v for k, v in cell.regime.items() if turns or k != "yaw_rate"}
-    return "; ".join(f"{plain_name(k)} {v}" for k, v in known.items())
+    return "; ".join(f"{plain(k)} {v}" for k, v in known.items())
 
 
 def first_sentence(text: str) -> str:
@@ -549,7 +550,7 @@ def _parameters(effect: NamedEffect) -> Iterable[str]:
         unit = "" if p.unit == "1" else f" {p.unit}"
         size = open_upwards(p) or with_error(p.value, p.std)
         held = " (held)" if p.std is None else ""
-        yield f"{plain_name(name)} {size}{unit}{held}"
+        yield f"{plain(name)} {size}{unit}{held}"
 
 
 def open_upwards(p: Estimate) -> str:
@@ -567,20 +568,15 @@ def with_error(value: float, std: float | None) -> str:
     return f"{value:.{digits}f} ± {std:.{digits}f}"
 
 
-def plain_name(name: str) -> str:
-    """A name of an effect or a parameter as words."""
-    return name.replace("_", " ")
-
-
 def roughly_known(name: str) -> str:
     """What is only roughly known as words: of the chair, or the bias or gain of a sensor."""
     error, _, channel = name.partition(":")
-    return f"{ERRORS[error]} of {channel}" if channel else plain_name(name)
+    return f"{ERRORS[error]} of {channel}" if channel else plain(name)
 
 
 def bold(name: str) -> str:
     """A name as words, to be shown bold."""
-    return f"**{plain_name(name)}**"
+    return f"**{plain(name)}**"
 
 
 def together(names: str) -> str:
