@@ -11,7 +11,13 @@ from dataclasses import dataclass, field, replace
 
 import mujoco
 
-from mjchair.diagnosis.data import sign_checks, standstill, trial_checks, unit_checks
+from mjchair.diagnosis.data import (
+    motion_checks,
+    sign_checks,
+    standstill,
+    trial_checks,
+    unit_checks,
+)
 from mjchair.errors import MjchairError
 from mjchair.measurement.lost_samples import without_lost
 from mjchair.measurement.trial import Trial, check_columns
@@ -233,6 +239,7 @@ def _checked(trial: Trial, axle: RearAxle, mass: float) -> tuple[Trial, list[str
         trial_checks.without_dead,
         trial_checks.with_angles_counted_on,
         trial_checks.other_side,
+        motion_checks.jumps,
     )
     for stage in stages:
         trial, noticed = stage(trial)

@@ -1,0 +1,63 @@
+"""Checks of a measured motion of a person: jumps that no body makes.
+
+In: a trial. Out: the trial as it is, and a note for each run whose motion jumps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from mjchair.measurement.trial import Trial
+from mjchair.simulation.table import Array
+
+COLUMN = "rider_motion"
+CLEAR = 8.0  # standard deviations of a step beside the mean of its neighbours (assumption)
+LEAST = 0.003  # m: markers on skin scatter by a millimetre (assumption)
+FEWEST = 20  # steps
+ONE = 1.5  # usual times between samples: less is one
+
+
+def jumps(trial: Trial) -> tuple[Trial, list[str]]:
+    """The trial, and a note where the measured motion of the person jumps between two samples.
+
+    Two markers that were taken for one another, or a marker that was lost, move the centre of mass
+    by millimetres at once. No force goes with that, and what it leaves passes for noise.
+    """
+    values = trial.other.get(COLUMN)
+    there = np.zeros(0, bool) if values is None else ~np.isnan(values)
+    if values is None or there.sum() <= FEWEST:
+        return trial, []
+    time = trial.time[there]
+    between = np.diff(time)
+    # across samples that are missing a person may have gone anywhere
+    beyond = np.where(between < ONE * np.median(between), _beyond(values[there]), 0.0)
+    at = np.flatnonzero(beyond)
+    if not at.size:
+        return trial, []
+    worst = at[np.argmax(np.abs(beyond[at]))]
+    times = "" if at.size == 1 else f", one of {at.size} such steps"
+    return trial, [
+        f"{trial.name}: {COLUMN} jumps by {abs(1e3 * beyond[worst]):.2g} mm at "
+        f"{time[worst + 1]:.2f} s{times}; was a marker lost, or taken for another? No force goes "
+        "with a jump: mend it, or leave these samples empty"
+    ]
+
+
+def _beyond(place: Array) -> Array:
+    """By how much the step to the next sample differs from those around it, m; 0 where alike.
+
+    Args:
+      place: (n,) m.
+
+    Returns:
+      (n - 1,)
+    """
+    step = np.diff(place)
+    off = np.zeros(step.size)
+    off[1:-1] = step[1:-1] - 0.5 * (step[:-2] + step[2:])
+    size = np.abs(off)
+    usual = 1.4826 * float(np.median(size))  # standard deviation, if normal
+    # a jump stands out in the steps to its two sides as well, by half
+    largest = size >= maximum_filter1d(size, 3)
+    return np.where(largest & (size > max(CLEAR * usual, LEAST)), off, 0.0)
