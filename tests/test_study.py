@@ -115,6 +115,19 @@ def test_channels_that_contradict_each_other_are_named(changed, words, tmp_path)
     fails(write(tmp_path, columns), words)
 
 
+@pytest.mark.parametrize("varies", [0.0, 0.01])
+def test_a_gyroscope_with_a_bias_in_a_slow_turn_is_no_wheel_in_metres(varies, tmp_path):
+    """A bias of 0.12 rad/s tells three times what the wheels do, and is for the diagnosis."""
+    turn = 0.055 + varies * np.sin(2.0 * TIME)
+    columns = {
+        "left_wheel_speed": (1.0 - 0.28 * turn) / 0.3,
+        "right_wheel_speed": (1.0 + 0.28 * turn) / 0.3,
+        "imu_gyro.z": turn + 0.12,
+        "heading": np.cumsum(turn + 0.12) * 0.02,
+    }
+    mjchair.read_study(write(tmp_path, columns))
+
+
 @pytest.mark.parametrize("gain", [0.5, 0.7, 1.3, 1.5, 2.0])
 @pytest.mark.parametrize("bends", [True, False])
 def test_a_wheel_whose_sensor_has_a_gain_has_its_sign(gain, bends, tmp_path):

@@ -29,6 +29,7 @@ KMH, CLOSE = 3.6, 1.15  # km/h in a m/s; factor by which a wheel's radius may be
 ALIKE = 0.95  # cosine of two stories that are one
 FORWARD, YAW, PULL = 0.05, 0.03, 0.05  # m/s, rad/s and m/s: motion below which nothing is compared
 OTHER_START = 1.0  # m/s, and the speed itself, by which a first speed is not the one that is seen
+BIAS = 0.2  # rad/s, that a gyroscope may tell at rest (assumption)
 WAY = 0.5  # m by the wheels, below which it is not compared with the places
 LENGTHS = {"mm": 1e3, "cm": 1e2, "in": 39.37}  # units of a length that people use, a metre
 
@@ -224,15 +225,34 @@ def _compare(trial: Trial, axle: RearAxle, stories: dict[str, Story], least: flo
         if min(sizes) <= least * np.sqrt(grid.size) or one @ two < ALIKE * sizes[0] * sizes[1]:
             continue
         large = int(sizes[1] > sizes[0])
-        ratio = sizes[large] / sizes[1 - large]
+        ratio = float(sizes[large] / sizes[1 - large])
         name, other = pair[large], pair[1 - large]
         if DEGREES / NEAR < ratio < DEGREES * NEAR and stories[name].unit:
             why = f"it tells {ratio:.1f} times what {_article(other)} does"
             _refuse(trial, name, "degrees", why, stories[name].unit)
         if name.startswith("velocity") and KMH / CLOSE < ratio < KMH * CLOSE:
             _refuse(trial, name, "km/h", f"it tells {ratio:.2f} times what {other} does", "km/h")
-        if other == "wheels" and 1.0 / NEAR < ratio * axle.left < NEAR and _speeds(trial):
+        # "wheels" is the last of the stories, so the larger is the first of the pair
+        in_metres = other == "wheels" and 1.0 / NEAR < ratio * axle.left < NEAR
+        if in_metres and not _may_be_biased(two, one, ratio) and _speeds(trial):
             _refuse_rolled(trial, axle, f"the wheels tell {1.0 / ratio:.2f} times what {name} does")
+
+
+def _may_be_biased(wheels: Array, other: Array, ratio: float) -> bool:
+    """Whether a bias may be why a gyroscope, or a heading made of it, tells more than the wheels.
+
+    One of 0.12 rad/s tells three times what the wheels do in a slow turn. Where the turn varies,
+    what varies must be as many times as large as well to be another unit.
+    """
+    more = abs(float(other.mean() - wheels.mean()))
+    if more > BIAS:
+        return False
+    one, two = wheels - wheels.mean(), other - other.mean()
+    sizes = np.linalg.norm(one), np.linalg.norm(two)
+    if min(sizes) <= YAW * np.sqrt(one.size):
+        return True
+    alike = one @ two > ALIKE * sizes[0] * sizes[1]
+    return not (alike and 1.0 / NEAR < sizes[1] / sizes[0] / ratio < NEAR)
 
 
 def _compare_with_way(trial: Trial, axle: RearAxle) -> None:
