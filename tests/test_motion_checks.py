@@ -7,8 +7,10 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
-from mjchair.diagnosis.data.motion_checks import COLUMN, jumps
+from mjchair.diagnosis.data.motion_checks import jumps
 from mjchair.measurement.trial import Trial
+
+COLUMN = "rider_motion"
 
 
 def trial(rate, rider_motion):

@@ -55,7 +55,7 @@ BOTH = Hypothesis((ROLLING, MOTOR), gain=900.0, score=880.0)
 
 
 def fit(total, *keys, promised=None):
-    terms = tuple(SimpleNamespace(effect=SimpleNamespace(key=k)) for k in keys)
+    terms = tuple(SimpleNamespace(effect=SimpleNamespace(key=k), parameters=()) for k in keys)
     return SimpleNamespace(
         total=total,
         promised=total if promised is None else promised,

@@ -11,7 +11,6 @@ from scipy.ndimage import maximum_filter1d
 from mjchair.measurement.trial import Trial
 from mjchair.simulation.table import Array
 
-COLUMN = "rider_motion"
 CLEAR = 8.0  # standard deviations of a step beside the mean of its neighbours (assumption)
 LEAST = 0.003  # m: markers on skin scatter by a millimetre (assumption)
 FEWEST = 20  # steps
@@ -19,29 +18,33 @@ ONE = 1.5  # usual times between samples: less is one
 
 
 def jumps(trial: Trial) -> tuple[Trial, list[str]]:
-    """The trial, and a note where the measured motion of the person jumps between two samples.
+    """The trial, and a note where a measured motion jumps between two samples.
 
     Two markers that were taken for one another, or a marker that was lost, move the centre of mass
     by millimetres at once. No force goes with that, and what it leaves passes for noise.
     """
-    values = trial.other.get(COLUMN)
-    there = np.zeros(0, bool) if values is None else ~np.isnan(values)
-    if values is None or there.sum() <= FEWEST:
-        return trial, []
-    time = trial.time[there]
-    between = np.diff(time)
+    said = [_jump(trial.time, name, values) for name, values in trial.other.items()]
+    return trial, [f"{trial.name}: {line}" for line in said if line]
+
+
+def _jump(time: Array, name: str, values: Array) -> str:
+    """What is said of the jumps of a motion (n,) m at times (n,) s; empty: there are none."""
+    there = ~np.isnan(values)
+    if there.sum() <= FEWEST:
+        return ""
+    time, between = time[there], np.diff(time[there])
     # across samples that are missing a person may have gone anywhere
     beyond = np.where(between < ONE * np.median(between), _beyond(values[there]), 0.0)
     at = np.flatnonzero(beyond)
     if not at.size:
-        return trial, []
+        return ""
     worst = at[np.argmax(np.abs(beyond[at]))]
     times = "" if at.size == 1 else f", one of {at.size} such steps"
-    return trial, [
-        f"{trial.name}: {COLUMN} jumps by {abs(1e3 * beyond[worst]):.2g} mm at "
-        f"{time[worst + 1]:.2f} s{times}; was a marker lost, or taken for another? No force goes "
-        "with a jump: mend it, or leave these samples empty"
-    ]
+    return (
+        f"{name} jumps by {abs(1e3 * beyond[worst]):.2g} mm at {time[worst + 1]:.2f} s{times}; was "
+        "a marker lost, or taken for another? No force goes with a jump: mend it, or leave these "
+        "samples empty"
+    )
 
 
 def _beyond(place: Array) -> Array:

@@ -66,9 +66,12 @@ def followed(base: Base, fitted: Fitted) -> Fitted:
     back as it is.
     """
     stuck = rules.is_stuck(total=fitted.total, promised=fitted.promised)
+    sizes = _sizes(fitted)
+    if not sizes:
+        return fitted
     two_sided = _two_sided(base, fitted)
     doubtful = _make_up(fitted) | _uneven(fitted.std, two_sided)
-    looked = [key for key in _sizes(fitted) if stuck or key in doubtful]
+    looked = [key for key in sizes if stuck or key in doubtful]
     if not looked:
         return fitted
     fitted = _widened(fitted, two_sided)
@@ -96,8 +99,6 @@ def _make_up(fitted: Fitted) -> set[ParameterId]:
 
 def _two_sided(base: Base, fitted: Fitted) -> dict[ParameterId, float]:
     """Standard errors by the columns of the other side, as they are where these cannot be."""
-    if not _sizes(fitted):
-        return fitted.std
     try:
         return from_other_side(base.bench, fitted)
     except (MjchairError, np.linalg.LinAlgError):
