@@ -61,3 +61,11 @@ def test_a_run_without_a_measured_motion_is_not_asked():
     plain = replace(trial(100.0, sways(100.0, 0.0)), other=MappingProxyType({}))
     assert jumps(plain) == (plain, [])
     assert jumps(trial(100.0, np.array([0.0, 1.0, 0.0])))[1] == []
+
+
+@pytest.mark.parametrize("name", ["left_wheel_force", "chair_heading", "chair_speed"])
+def test_what_is_no_motion_may_jump(name):
+    """A hand that grips is a step of its force, and a heading goes on from pi to -pi."""
+    steps = np.repeat([0.0, 6.0, 0.0], 100)
+    assert jumps(replace(trial(100.0, steps), other=MappingProxyType({name: steps})))[1] == []
+    assert jumps(trial(100.0, steps))[1]

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from mjchair.measurement.trial import Trial
+from mjchair.simulation.inputs import OTHER_COLUMNS
 from mjchair.simulation.table import Array
 
 CLEAR = 8.0  # standard deviations of a step beside the mean of its neighbours (assumption)
@@ -23,7 +24,8 @@ def jumps(trial: Trial) -> tuple[Trial, list[str]]:
     Two markers that were taken for one another, or a marker that was lost, move the centre of mass
     by millimetres at once. No force goes with that, and what it leaves passes for noise.
     """
-    said = [_jump(trial.time, name, values) for name, values in trial.other.items()]
+    motions = {name: v for name, v in trial.other.items() if OTHER_COLUMNS.get(name) == "m"}
+    said = [_jump(trial.time, name, values) for name, values in motions.items()]
     return trial, [f"{trial.name}: {line}" for line in said if line]
 
 
