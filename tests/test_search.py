@@ -27,6 +27,7 @@ from mjchair.diagnosis.explain import (
     rivals,
     selection,
     shortlist,
+    whole_beside,
     whole_sizes,
 )
 from mjchair.diagnosis.explain import fits as fits_of_hypotheses
@@ -42,7 +43,7 @@ from mjchair.errors import MjchairError
 
 def effect(name, common=1.0):
     return SimpleNamespace(
-        effect=SimpleNamespace(key=name, name=name, common=common),
+        effect=SimpleNamespace(key=name, name=name, common=common, fitted=()),
         free=("size",),
         group=name,
         columns=(name,),
@@ -99,6 +100,7 @@ def fits(monkeypatch):
     monkeypatch.setattr(rules, "NOTHING", 0.0)  # no effect is so small that columns hold
     monkeypatch.setattr(probable, "probabilities", lambda *_: {})
     monkeypatch.setattr(whole_sizes, "fits", lambda *_: ())
+    monkeypatch.setattr(whole_beside, "fits", lambda *_: ())
     monkeypatch.setattr(whole_sizes, "compared", lambda _, fitted: fitted)
     monkeypatch.setattr(open_ended, "with_least_sizes", lambda _, fitted: fitted)
     monkeypatch.setattr(fits_of_hypotheses, "with_form_errors", lambda fitted: fitted)
@@ -833,6 +835,38 @@ def test_an_effect_of_a_whole_size_may_be_the_better_one(fits, monkeypatch, tota
     pushed = replace(here[0], fitted=SimpleNamespace(**{**vars(here[0].fitted), "variant": far}))
     closed = (pushed, SimpleNamespace(exists=False))
     assert (alternatives.or_whole(looking, closed) is closed) == (total > 1500.0)
+
+
+@pytest.mark.parametrize("total", [1110.0, 1600.0])
+def test_an_effect_of_a_whole_size_may_be_better_than_several(fits, monkeypatch, total):
+    """Weak drives and a rider who sways stood for tires that resist turning."""
+    several = Tried(BOTH, fit(1500.0, "rolling", "motor"))
+    whole = fit(total, "wind")
+    looked = []
+
+    def made(base, single, best):
+        looked.append((single.total, best.total))
+        return [((WIND,), whole)]
+
+    monkeypatch.setattr(whole_beside, "fits", made)
+    monkeypatch.setattr(hypotheses, "weigh", lambda *_: Hypothesis((WIND,), 9.0, 9.0))
+    believe(monkeypatch, lambda _: True)
+    monkeypatch.setattr(fits_of_hypotheses, "gap_after", lambda *_: SimpleNamespace(exists=False))
+    monkeypatch.setattr(Fits, "anew", lambda _, tried: tried.fitted)
+    looking = searching()
+    closed = SimpleNamespace(exists=False)
+    found, left = alternatives.or_whole_beside(looking, (several, closed))
+    assert (found.fitted is whole and not left.exists) == (total < 1500.0)
+    looking.tried.append(Tried(ONE, fit(1700.0, "rolling")))
+    alternatives.or_whole_beside(looking, (several, closed))
+    assert [single for single, _ in looked] == [2000.0, min(1700.0, total)]
+    # one effect that leaves nothing is not doubted, nor one of a whole size
+    one = (Tried(ONE, fit(1500.0, "rolling")), closed)
+    assert alternatives.or_whole_beside(looking, one) is one
+    parameter = SimpleNamespace(whole=(1.0,))
+    monkeypatch.setattr(whole_sizes, "parameter_of", lambda _: parameter)
+    assert alternatives.or_whole_beside(looking, (several, closed))[0] is several
+    assert len(looked) == 2
 
 
 def test_a_fit_that_cannot_come_near_the_best_is_not_started_again(fits):

@@ -13,56 +13,44 @@ import numpy as np
 import pytest
 
 from mjchair.diagnosis.explain import whole_sizes
+from mjchair.diagnosis.explain.whole_sizes import Seen
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.effects.library import MECHANICAL, find
 from mjchair.errors import MjchairError
 
 
-def begun(monkeypatch, effect, chi2, other=None):
+def begun(effect, chi2, other=None):
     """The best size at which a fit of the effect begins; None: none is better than no effect."""
-    return next(iter(all_begun(monkeypatch, effect, chi2, other)), None)
+    return next(iter(all_begun(effect, chi2, other)), None)
 
 
-def all_begun(monkeypatch, effect, chi2, other=None):
+def all_begun(effect, chi2, other=None):
     """The sizes at which fits of the effect begin, best first.
 
     other: chi2 of a fit of other effects.
     """
     (parameter,) = [p for p in effect.fitted if p.whole]
 
-    def told(base, variant, windows):
-        return chi2(variant.terms[0].values[parameter.name])
+    def look(term):
+        return Seen(chi2(term.values[parameter.name]), Variant((), terms=(term,)))
 
-    monkeypatch.setattr(whole_sizes, "_at", told)
-    plain = SimpleNamespace(variant=Variant(()), track=None, chi2=np.arange(6.0))
-    rival = None if other is None else SimpleNamespace(variant=None, track=None)
-    monkeypatch.setattr(
-        whole_sizes,
-        "_chi2",
-        lambda _, variant, *__: chi2(parameter.neutral) if variant is plain.variant else other,
-    )
-    base = SimpleNamespace(
-        plain=plain,
-        around=SimpleNamespace(variant=Variant(())),
-        bench=SimpleNamespace(windows=np.arange(6)),
-    )
     start = SimpleNamespace(effect=effect, free=(parameter.name,))
-    begins = whole_sizes._best_sizes(base, start, parameter, rival)
+    nothing = chi2(parameter.neutral)
+    most = 0.0 if other is None else nothing - other
+    begins = [s.variant for s in whole_sizes.best_sizes(start, look, nothing, most)]
     return [begin.terms[0].values[parameter.name] for begin in begins]
 
 
 @pytest.mark.parametrize("truth", [0.055, 0.083, 0.12])
-def test_a_fit_begins_next_to_the_size_that_is_there(monkeypatch, truth):
+def test_a_fit_begins_next_to_the_size_that_is_there(truth):
     """A valley of a shimmy is narrow: nothing at half of the size tells of it."""
     effect = find("relaxation_length")
-    size = begun(
-        monkeypatch, effect, lambda v: 2000.0 - 1500.0 * math.exp(-(((v - truth) / 0.01) ** 2))
-    )
+    size = begun(effect, lambda v: 2000.0 - 1500.0 * math.exp(-(((v - truth) / 0.01) ** 2)))
     assert size == pytest.approx(truth, abs=0.008)
 
 
-def test_a_fit_begins_in_each_of_two_valleys(monkeypatch):
+def test_a_fit_begins_in_each_of_two_valleys():
     """Casters shimmied as well at 0.13 m as at 0.08, where 0.09 was hidden, and not at 0.1."""
 
     def chi2(size):
@@ -71,29 +59,27 @@ def test_a_fit_begins_in_each_of_two_valleys(monkeypatch):
             for at, deep in ((0.087, 1400.0), (0.13, 1300.0))
         )
 
-    sizes = all_begun(monkeypatch, find("relaxation_length"), chi2)
+    sizes = all_begun(find("relaxation_length"), chi2)
     assert sorted(sizes) == pytest.approx([0.087, 0.13], abs=0.006)
 
 
 @pytest.mark.parametrize(("other", "begins"), [(1400.0, True), (200.0, False)])
-def test_a_size_that_misses_half_of_what_others_bring_begins_no_fit(monkeypatch, other, begins):
+def test_a_size_that_misses_half_of_what_others_bring_begins_no_fit(other, begins):
     def chi2(size):
         return 2000.0 - 500.0 * math.exp(-(((size - 0.08) / 0.01) ** 2))
 
-    size = begun(monkeypatch, find("relaxation_length"), chi2, other)
+    size = begun(find("relaxation_length"), chi2, other)
     assert (size is not None) == begins
 
 
-def test_a_size_that_brings_nothing_begins_no_fit(monkeypatch):
-    assert begun(monkeypatch, find("tire_friction"), lambda v: 1000.0 + 50.0 * abs(v - 1.0)) is None
+def test_a_size_that_brings_nothing_begins_no_fit():
+    assert begun(find("tire_friction"), lambda v: 1000.0 + 50.0 * abs(v - 1.0)) is None
 
 
 def test_the_windows_that_disagree_most_are_looked_at():
-    base = SimpleNamespace(
-        plain=SimpleNamespace(chi2=np.array([5.0, 90.0, 20.0, 70.0, 60.0, 1.0])),
-        bench=SimpleNamespace(windows=np.array([0, 1, 3, 4, 7, 8])),
-    )
-    assert whole_sizes._worst_windows(base) == [1, 4, 7, 3]
+    fitted = SimpleNamespace(chi2=np.array([5.0, 90.0, 20.0, 70.0, 60.0, 1.0]))
+    base = SimpleNamespace(bench=SimpleNamespace(windows=np.array([0, 1, 3, 4, 7, 8])))
+    assert whole_sizes.worst_windows(base, fitted) == [1, 4, 7, 3]
 
 
 def test_a_size_that_no_chair_can_have_fits_nothing():
@@ -104,7 +90,7 @@ def test_a_size_that_no_chair_can_have_fits_nothing():
     base = SimpleNamespace(
         bench=SimpleNamespace(simulator=simulator, noise={}), around=SimpleNamespace(track=None)
     )
-    assert whole_sizes._at(base, Variant(()), [0]) == math.inf
+    assert whole_sizes.track_of(base, Variant(()), [0]) is None
 
 
 def test_whole_sizes_are_sizes_that_can_be():

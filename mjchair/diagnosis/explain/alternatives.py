@@ -1,18 +1,21 @@
-"""Single effects that linear algebra around the chair without effects does not see, or sees small.
+"""Effects that linear algebra around the chair without effects does not see, or sees small.
 
-In: fits, and the single effect that is best so far, with the gap that it leaves. Out: the same, or
-a better one: with what is only roughly known nearly as given, by most windows alone, in another
-form, or of a whole size.
+In: fits, and the effect that is best so far, with the gap that it leaves. Out: the same, or a
+better one: with what is only roughly known nearly as given, by most windows alone, in another form,
+or of a whole size, alone or beside one other.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
+from operator import attrgetter
 
 import numpy as np
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import hypotheses, whole_sizes
+from mjchair.diagnosis.explain import hypotheses, whole_beside, whole_sizes
+from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Tried
 from mjchair.diagnosis.explain.fits import Fits, believable
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
@@ -20,6 +23,7 @@ from mjchair.diagnosis.explain.screening import Base, goes_far
 from mjchair.diagnosis.explain.shortlist import WithGap, best_of, better
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bounded import Reduced
+from mjchair.diagnosis.fit.nonlinear import Fitted
 
 APART = 10.0  # times the chi2 of most windows: there a chair went another way (assumption)
 NARROW = 1.0  # standard deviations: a wall for what may have taken an effect for itself
@@ -111,12 +115,37 @@ def or_whole(fits: Fits, here: WithGap) -> WithGap:
     shimmies. Small changes do not lead there, and what they lead to may stand in for it: a patch of
     the floor for wheels that shimmy once, a centre of mass and an inertia for a turn that ends.
     """
-    best = here[0]
-    settled = not here[1].exists and not goes_far(best.fitted)
+    settled = not here[1].exists and not goes_far(here[0].fitted)
     if settled and not whole_sizes.shimmies(fits.base):
         return here
-    for start, fitted in whole_sizes.fits(fits.base, fits.anew(best)):
-        tried = Tried(fits.weigh([start]), fitted)
+    made = whole_sizes.fits(fits.base, fits.anew(here[0]))
+    return _or_made(fits, here, (((start,), fitted) for start, fitted in made))
+
+
+def or_whole_beside(fits: Fits, here: WithGap) -> WithGap:
+    """The effects, or a better one of a whole size, alone or beside one other.
+
+    These are tried where it takes several effects, or one leaves a gap. What small changes lead to
+    may then stand in for both: a centre of mass, a drive and a rolling resistance for bearings that
+    rub and tires that resist turning, and a drive with a rider who sways for these tires alone.
+    """
+    best = here[0]
+    starts = best.hypothesis.starts
+    several = len(starts) > 1 or here[1].exists
+    if not several or any(whole_sizes.parameter_of(s.effect) is not None for s in starts):
+        return here
+    singles = [t.fitted for t in fits.tried if len(t.hypothesis.starts) == 1]
+    single = min(singles, key=attrgetter("total"), default=fits.base.plain)
+    return _or_made(fits, here, whole_beside.fits(fits.base, single, fits.anew(best)))
+
+
+def _or_made(
+    fits: Fits, here: WithGap, made: Iterable[tuple[tuple[Start, ...], Fitted]]
+) -> WithGap:
+    """The effects, or a better one of fits that were made elsewhere, which are kept."""
+    best = here[0]
+    for starts, fitted in made:
+        tried = Tried(fits.weigh(starts), fitted)
         fits.keep_better(tried)
         if tried.price < best.price and believable(fitted):
             best = tried

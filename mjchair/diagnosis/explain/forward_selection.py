@@ -29,7 +29,13 @@ def grown(fits: Fits) -> WithGap | None:
     """
     if not _promises(fits):
         return None
-    here = _found(fits) or left_over.several(fits)
+    here = _grown_from(fits, _found(fits) or left_over.several(fits))
+    other = alternatives.or_whole_beside(fits, here) if here else None
+    return here if other is here else _grown_from(fits, other)
+
+
+def _grown_from(fits: Fits, here: WithGap | None) -> WithGap | None:
+    """The best hypothesis, grown from this one; None: there is none."""
     size = len(here[0].hypothesis.starts) if here else 0
     while size < rules.MOST and (here is None or here[1].exists):
         size += 1

@@ -14,8 +14,8 @@ those that are better than their neighbours and these.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,6 +36,20 @@ BETWEEN = 2  # times that the best size is compared with the middles to its neig
 VALLEYS = 2  # sizes that are better than their neighbours, at which fits begin
 
 
+@dataclass(frozen=True)
+class Seen:
+    """A chair with an effect at a whole size.
+
+    Attributes:
+      chi2: of the windows that are looked at; infinite where no chair is so. variant: the chair.
+      beside: another effect that is in it.
+    """
+
+    chi2: float
+    variant: Variant
+    beside: tuple[Start, ...] = ()
+
+
 def shimmies(base: Base) -> bool:
     """Whether a caster shimmies in any window."""
     return any(w.shimmies for w in base.bench.simulator.windows)
@@ -47,19 +61,43 @@ def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitte
     Args:
       other: a fit of other effects; a size that misses half of what it brings begins no fit.
     """
-    # where it slides or shimmies, coarse derivatives lead a fit astray
-    touchy = replace(base.around.track, touchy=frozenset(_worst_windows(base)))
+    windows = worst_windows(base, base.plain)
+    nothing = chi2(base, base.plain.variant, base.plain.track, windows)
+    most = nothing - chi2(base, other.variant, other.track, windows) if other else 0.0
+    for start in starts(base):
+
+        def look(term: Term) -> Seen:
+            variant = replace(base.around.variant, terms=(term,))
+            here = track_of(base, variant, windows)
+            return Seen(np.inf if here is None else chi2(base, variant, here, windows), variant)
+
+        for begin in best_sizes(start, look, nothing, most):
+            made = fit_from(base, begin.variant, windows)
+            if made is not None:
+                yield start, made
+
+
+def starts(base: Base) -> Iterator[Start]:
+    """The first start of every effect that has whole sizes."""
     seen = set()
     for start in base.starts:
-        p = parameter_of(start.effect)
-        if p is None or start.effect.key in seen:
-            continue
-        seen.add(start.effect.key)
-        for begin in _best_sizes(base, start, p, other):
-            try:
-                yield start, refit(base.bench, begin, touchy)
-            except (MjchairError, np.linalg.LinAlgError):
-                continue  # this chair cannot have it
+        key = start.effect.key
+        if key not in seen and parameter_of(start.effect) is not None:
+            seen.add(key)
+            yield start
+
+
+def fit_from(base: Base, begin: Variant, windows: Sequence[int]) -> Fitted | None:
+    """The fit that begins at a chair; None: this chair cannot have it.
+
+    Args:
+      windows: in which it slides or shimmies: there coarse derivatives lead a fit astray.
+    """
+    touchy = replace(base.around.track, touchy=frozenset(windows))
+    try:
+        return refit(base.bench, begin, touchy)
+    except (MjchairError, np.linalg.LinAlgError):
+        return None
 
 
 def compared(base: Base, fitted: Fitted) -> Fitted:
@@ -111,40 +149,40 @@ def parameter_of(effect: Effect) -> Parameter | None:
     return next((p for p in effect.fitted if p.whole), None)
 
 
-def _best_sizes(
-    base: Base, start: Start, parameter: Parameter, other: Fitted | None
-) -> list[Variant]:
-    """The chair with the best sizes of an effect; none where no size brings more than it costs.
+def best_sizes(
+    start: Start, look: Callable[[Term], Seen], nothing: float, most: float
+) -> list[Seen]:
+    """What is seen at the best sizes of an effect; none where no size brings more than it costs.
 
     Casters that shimmy at one size may do so at another in the same rhythm: 0.13 m of a relaxation
     length fitted as well as 0.08 where 0.09 was hidden, and 0.1 did not.
-    """
-    windows = _worst_windows(base)
-    neutral = start.effect.neutral()
-    nothing = _chi2(base, base.plain.variant, base.plain.track, windows)
-    totals = {parameter.neutral: nothing}
-    variants: dict[float, Variant] = {}
 
-    def look(size: float) -> None:
-        term = Term(start.effect, {**neutral, parameter.name: size}, start.free)
-        variants[size] = replace(base.around.variant, terms=(term,))
-        totals[size] = _at(base, variants[size], windows)
+    Args:
+      look: at the effect at a size. nothing: chi2 of the same windows without it. most: what other
+        effects bring there.
+    """
+    parameter = parameter_of(start.effect)
+    assert parameter is not None
+    neutral = start.effect.neutral()
+    totals = {parameter.neutral: nothing}
+    seen: dict[float, Seen] = {}
+
+    def add(size: float) -> None:
+        seen[size] = look(Term(start.effect, {**neutral, parameter.name: size}, start.free))
+        totals[size] = seen[size].chi2
 
     for size in parameter.whole:
-        look(size)
+        add(size)
     ends = []
     for best in _valleys(totals)[:VALLEYS]:
         for _ in range(BETWEEN if totals[best] < nothing else 0):
             near = _middles(sorted(totals), best)
             for size in near:
-                look(size)
+                add(size)
             best = min(best, *near, key=totals.__getitem__)
         ends.append(best)
-    least = rules.needed(len(start.free))
-    if other is not None:
-        there = _chi2(base, other.variant, other.track, windows)
-        least = max(least, rules.REPLACES * (nothing - there))
-    return [variants[size] for size in ends if nothing - totals[size] > least]
+    least = max(rules.needed(len(start.free)), rules.REPLACES * most)
+    return [seen[size] for size in ends if nothing - totals[size] > least]
 
 
 def _valleys(totals: Mapping[float, float]) -> list[float]:
@@ -159,9 +197,9 @@ def _valleys(totals: Mapping[float, float]) -> list[float]:
     return sorted(lows, key=totals.__getitem__)
 
 
-def _worst_windows(base: Base) -> list[int]:
-    """The windows that may be fitted to and disagree most with the chair without effects."""
-    order = np.argsort(-base.plain.chi2)
+def worst_windows(base: Base, fitted: Fitted) -> list[int]:
+    """The windows that may be fitted to and disagree most with a fit."""
+    order = np.argsort(-fitted.chi2)
     return [int(i) for i in base.bench.windows[order[:LOOKED]]]
 
 
@@ -172,8 +210,8 @@ def _middles(sizes: Sequence[float], best: float) -> list[float]:
     return [0.5 * (best + other) for other in near]
 
 
-def _at(base: Base, variant: Variant, windows: Sequence[int]) -> float:
-    """Chi2 of windows of a variant, their states fitted anew; infinite where no chair is so."""
+def track_of(base: Base, variant: Variant, windows: Sequence[int]) -> Track | None:
+    """Windows of a variant, their states fitted anew; None where no chair is so."""
     simulator = base.bench.simulator
     errors = variant.sensor_errors(simulator.channels)
     before = base.around.track
@@ -181,13 +219,12 @@ def _at(base: Base, variant: Variant, windows: Sequence[int]) -> float:
         model = simulator.compile(variant.edit)
         here = track(simulator, model, base.bench.noise, errors, before, anew=True, only=windows)
     except MjchairError:
-        return np.inf
-    if not all(np.isfinite(here.predicted[i]).any() for i in windows):
-        return np.inf
-    return _chi2(base, variant, here, windows)
+        return None
+    finite = all(np.isfinite(here.predicted[i]).any() for i in windows)
+    return here if finite else None
 
 
-def _chi2(base: Base, variant: Variant, here: Track, windows: Sequence[int]) -> float:
+def chi2(base: Base, variant: Variant, here: Track, windows: Sequence[int]) -> float:
     """Chi2 of windows with what is roughly known put where it fits best, priors included."""
     count = len(base.nuisances)
     system = base.bench.system(here, base.nuisances, count, variant, only=windows)

@@ -1,0 +1,69 @@
+"""Effects of a whole size beside one other effect.
+
+In: the screened columns, the best fit of a single effect, and the best fit of all. Out: fits that
+begin at a whole size with the effect beside it that linear algebra finds best there.
+
+Alone such a size may explain nothing: a moment against turning is seen in turns, and where bearings
+rub as well, every coast disagrees more. Small changes do not lead there either. So the windows that
+disagree most with the best single effect are simulated at a few sizes, as `whole_sizes` does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mjchair.diagnosis.explain import hypotheses, whole_sizes
+from mjchair.diagnosis.explain.candidates import Start
+from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis.explain.whole_sizes import Seen
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.nonlinear import Fitted
+from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.diagnosis.replay.window_states import Track
+
+
+def fits(base: Base, single: Fitted, best: Fitted) -> Iterator[tuple[tuple[Start, ...], Fitted]]:
+    """Fits of an effect at a whole size, alone or with one other effect.
+
+    Args:
+      single: the best fit of one effect. best: that of any; a size that misses half of what it
+        brings beyond one effect begins no fit.
+    """
+    windows = whole_sizes.worst_windows(base, single)
+    around = base.around
+    nothing = _with_best(base, around.variant, around.track, windows, base.starts).chi2
+    most = nothing - whole_sizes.chi2(base, best.variant, best.track, windows)
+    for start in whole_sizes.starts(base):
+        others = [s for s in base.starts if s.effect.key != start.effect.key]
+
+        def look(term: Term, others: Sequence[Start] = others) -> Seen:
+            variant = replace(around.variant, terms=(term,))
+            here = whole_sizes.track_of(base, variant, windows)
+            if here is None:
+                return Seen(np.inf, variant)
+            return _with_best(base, variant, here, windows, others)
+
+        for seen in whole_sizes.best_sizes(start, look, nothing, most):
+            made = whole_sizes.fit_from(base, seen.variant, windows)
+            if made is not None:
+                yield (start, *seen.beside), made
+
+
+def _with_best(
+    base: Base, variant: Variant, here: Track, windows: Sequence[int], others: Sequence[Start]
+) -> Seen:
+    """A chair with the single one of other effects that fits these windows best, if any does.
+
+    The parameters of this effect cost what they always do.
+    """
+    columns = {**base.nuisances, **base.columns}
+    system = base.bench.system(here, columns, len(base.nuisances), variant, only=windows)
+    reduced = bounded.reduce(system, windows)
+    best = max(hypotheses.singles(reduced, others), key=lambda h: h.score, default=None)
+    if best is None or best.score <= 0.0 or not hypotheses.can_be(reduced, best):
+        return Seen(reduced.total, variant)
+    terms = (*variant.terms, *hypotheses.terms(reduced, best))
+    return Seen(reduced.total - best.score, replace(variant, terms=terms), best.starts)
