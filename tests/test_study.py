@@ -494,6 +494,23 @@ def test_strokes_on_the_spot_are_no_pushing_to_and_fro():
         assert len(standstill.rests(driven)) == count
 
 
+def test_a_stroke_that_begins_as_the_chair_stops_once_more_is_none_on_the_spot():
+    """A person moved on a chair at rest, which stopped once more as the first stroke began.
+
+    The stroke passed for one on the spot, and 1.9 s that tell of the person alone were fitted.
+    """
+    time = np.arange(0.0, 8.0, 0.01)
+    speed = np.where(
+        time < 2.8, np.maximum(0.4 * np.sin(2.0 * np.pi * time) - 0.2, 0.0), time - 2.8
+    )
+    torque = np.clip(20.0 * (time - 2.3), 0.0, 16.0)
+    speed[(time > 2.56) & (time < 2.62)] = 0.2  # the stroke begins, and the chair stops again
+    both = {"left_wheel_speed": speed, "right_wheel_speed": speed}
+    run = _run(time, both)
+    driven = replace(run.trial, inputs=Inputs(time, {"left_wheel": torque, "right_wheel": torque}))
+    assert [after for _, after in standstill.rests(driven)] == pytest.approx([2.85], abs=0.1)
+
+
 def test_a_chair_that_stands_as_its_run_ends_has_come_to_rest():
     """A coast that stood for its last 0.7 s was fitted through its stop."""
     time = np.arange(0.0, 8.0, 0.01)

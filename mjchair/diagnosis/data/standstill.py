@@ -29,6 +29,7 @@ STANDS_AT_END = 0.2  # s, the same as a run ends: whether the chair turns back i
 ROCKING = 3.0  # times those averages: a chair that rocks to rest is slower
 ROLLS = 1.0  # s, at least, before a stop or after a start: less holds no window
 PUSHES = 5.0  # N m on a wheel: hands that rest on the rims give less (assumption)
+WHILE = 0.75  # quantile of the torque while the chair moves: the stroke that rolls it on is shorter
 BEFORE = 0.1  # s before the chair stands, as long as the average
 ROCKS = 2.0  # s after that: the chairs that ship rock for about as long, by assumed tire damping
 
@@ -95,12 +96,15 @@ def _rolls_on(time: Array, still: Sequence[tuple[int, int]]) -> float:
 
 
 def _is_pushed(trial: Trial, moves: NDArray[np.bool_]) -> bool:
-    """Whether a wheel is driven where the chair moves, by torques that are known."""
+    """Whether a wheel is driven for much of the time in which the chair moves.
+
+    A chair may stop once more as the first stroke begins: the SmartWheel's did, for 0.07 s.
+    """
     if trial.inputs is None or not moves.any():
         return False
     time, at = trial.inputs.time, trial.time[moves]
     torques = [np.interp(at, time, np.nan_to_num(t)) for t in trial.inputs.controls.values()]
-    return any(float(np.abs(t).max()) > PUSHES for t in torques)
+    return any(float(np.quantile(np.abs(t), WHILE)) > PUSHES for t in torques)
 
 
 def _longer(
