@@ -496,6 +496,7 @@ def linear() -> Iterator[None]:
         mock.patch.object(forward_selection, "beside", lambda _fits, _best: None),
         # a linear system neither slides nor shimmies, and goes another way nowhere
         mock.patch.object(alternatives, "or_whole", lambda _fits, here: here),
+        mock.patch.object(alternatives, "or_whole_beside", lambda _fits, here: here),
         mock.patch.object(alternatives, "or_by_most_windows", lambda _fits, here: here),
         mock.patch.object(selection, "confirmed", lambda _base, _fitted, gap: gap),
         mock.patch.object(gaps, "DRAWS", DRAWS),
