@@ -5,17 +5,16 @@ import re
 from dataclasses import replace
 from types import SimpleNamespace
 
+import linear_system
 import numpy as np
 import pytest
+from linear_system import start
 
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import calibration, hypotheses, probability
 from mjchair.diagnosis.explain.calibration import Chosen, Weight
-from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.column_ids import (
     Driver,
-    EffectColumn,
-    EffectGroup,
     ForceColumn,
     ForceGroup,
     Quantity,
@@ -24,31 +23,12 @@ from mjchair.diagnosis.explain.probability import NONE, OUTSIDE, of_any, of_effe
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import RoughlyKnown
 from mjchair.diagnosis.fit.process import KINDS
-from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.fit.variant import Variant
 from mjchair.diagnosis.replay.pulses import Force
-from mjchair.effects.library import find
 from mjchair.errors import MjchairError
 
 COUNT = 120  # drawn studies
 NAMES = ("rolling_resistance", "caster_trail", "caster_friction")
-
-
-def start(name):
-    effect = find(name)
-    group = EffectGroup(name, 0)
-    p = effect.fitted[0]
-
-    def combine(coefficients):
-        return {p.name: p.neutral + float(coefficients[0]) * p.change}
-
-    return Start(
-        effect=effect,
-        group=group,
-        columns=(EffectColumn(group, 0),),
-        combine=combine,
-        free=(p.name,),
-    )
 
 
 def base(size, alike=0.0, force=0.0):
@@ -60,16 +40,7 @@ def base(size, alike=0.0, force=0.0):
     starts = [start(name) for name in NAMES]
     columns = [s.columns[0] for s in starts]
     columns.append(ForceColumn(ForceGroup(Force.FORWARD, Driver(Quantity.SPEED)), 0))
-    system = System(
-        columns=columns,
-        nuisance=0,
-        G=(J.T @ J)[None],
-        b=(J.T @ r)[None],
-        c=np.array([r @ r]),
-        run=np.zeros(1, int),
-        back=np.zeros(0),
-    )
-    reduced = bounded.reduce(system, [0])
+    reduced = bounded.reduce(linear_system.system(columns, J, r), [0])
     plain = SimpleNamespace(total=reduced.total)
     return SimpleNamespace(reduced=reduced, starts=starts, plain=plain)
 

@@ -8,31 +8,16 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import linear_system
 import numpy as np
 import pytest
+from linear_system import start
 
 from mjchair.diagnosis.explain import whole_beside, whole_sizes
-from mjchair.diagnosis.explain.candidates import Start
-from mjchair.diagnosis.explain.column_ids import EffectColumn, EffectGroup
-from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.fit.variant import Variant
-from mjchair.effects.library import find
 
 MOMENT, ROLLING = 4.3, 0.004  # N m, 1
 COLUMNS = np.linalg.qr(np.random.default_rng(3).standard_normal((40, 3)))[0]
-
-
-def start(name):
-    effect = find(name)
-    p = effect.fitted[0]
-    group = EffectGroup(name, 0)
-    return Start(
-        effect=effect,
-        group=group,
-        columns=(EffectColumn(group, 0),),
-        combine=lambda c: {p.name: p.neutral + float(c[0]) * p.change},
-        free=(p.name,),
-    )
 
 
 SCRUB, RESISTANCE = start("turning_scrub"), start("rolling_resistance")
@@ -52,16 +37,7 @@ def base(monkeypatch):
 
     def system(here, columns, nuisance, variant, only):
         J = np.stack([300.0 * COLUMNS[:, 0], COLUMNS[:, 1] - 5.0 * COLUMNS[:, 2]], axis=1)
-        r = residual(here, ROLLING)
-        return System(
-            columns=list(columns),
-            nuisance=0,
-            G=(J.T @ J)[None],
-            b=(J.T @ r)[None],
-            c=np.array([r @ r]),
-            run=np.zeros(1, int),
-            back=np.zeros(0),
-        )
+        return linear_system.system(columns, J, residual(here, ROLLING))
 
     monkeypatch.setattr(
         whole_sizes, "track_of", lambda _, variant, __: variant.terms[0].values["moment"]

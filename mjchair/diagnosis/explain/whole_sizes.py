@@ -93,9 +93,13 @@ def fit_from(base: Base, begin: Variant, windows: Sequence[int]) -> Fitted | Non
     Args:
       windows: in which it slides or shimmies: there coarse derivatives lead a fit astray.
     """
-    touchy = replace(base.around.track, touchy=frozenset(windows))
+    return _refitted(base, begin, replace(base.around.track, touchy=frozenset(windows)))
+
+
+def _refitted(base: Base, begin: Variant, before: Track) -> Fitted | None:
+    """The fit that begins at a chair and a track; None: this chair cannot have it."""
     try:
-        return refit(base.bench, begin, touchy)
+        return refit(base.bench, begin, before)
     except (MjchairError, np.linalg.LinAlgError):
         return None
 
@@ -130,10 +134,9 @@ def _beside(base: Base, fitted: Fitted) -> Iterator[Fitted]:
         for share in (1.0 - BESIDE, 1.0 + BESIDE):
             moved = replace(term, values={**term.values, p.name: share * term.values[p.name]})
             begin = replace(fitted.variant, terms=(*terms[:k], moved, *terms[k + 1 :]))
-            try:
-                yield refit(base.bench, begin, fitted.track)
-            except (MjchairError, np.linalg.LinAlgError):
-                continue  # this chair cannot have it
+            made = _refitted(base, begin, fitted.track)
+            if made is not None:
+                yield made
 
 
 def _whole(fitted: Fitted) -> Iterator[tuple[int, Term, Parameter]]:
