@@ -179,6 +179,14 @@ def without_estimated_torques(study: Study) -> Study:
     return replace(study, runs=left, notes=(*study.notes, f"{said}; left out"))
 
 
+def other_wheel(channel: str) -> str:
+    """The same channel of the other side; of what has no side, a name that no channel has."""
+    left, right = "left", "right"
+    if channel.startswith(left):
+        return right + channel.removeprefix(left)
+    return left + channel.removeprefix(right)
+
+
 def with_copied_wheels(study: Study) -> Study:
     """The study with one measured wheel standing for both in runs that tell nothing of a turn."""
     runs = [replace(run, trial=trial_checks.with_copied_wheel(run.trial)) for run in study.runs]

@@ -18,6 +18,7 @@ from mjchair.diagnosis.explain import missing_force
 from mjchair.diagnosis.explain.column_ids import EffectColumn, EffectGroup
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ColumnId
+from mjchair.diagnosis.fit.parameter_columns import sensor_column
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.replay import derivatives
 from mjchair.diagnosis.replay.derivatives import Column
@@ -197,9 +198,7 @@ def _add_sensor(out: Candidates, around: Around, effect: Effect) -> None:
     assert effect.sensor is not None
     p = effect.parameter(effect.sensor)
     group = EffectGroup(effect.key, 0)
-    column = derivatives.sensor_column(
-        around.bench.simulator, around.track, effect.sensor, str(effect.channel), p.change
-    )
+    column = sensor_column(around.bench, around.track, effect.sensor, str(effect.channel), p.change)
 
     def combine(coefficients: Array) -> Values:
         return {p.name: clip(p, float(coefficients[0]) * p.change)}

@@ -15,14 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.diagnosis.data.own_resistance import own_resistance
+from mjchair.diagnosis.data.study import other_wheel
 from mjchair.diagnosis.explain import missing_force
 from mjchair.diagnosis.explain.column_ids import EffectColumn, EffectGroup, ForceColumn, Quantity
 from mjchair.diagnosis.fit import noise_levels, process
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ColumnId
 from mjchair.diagnosis.fit.noise_levels import Levels
+from mjchair.diagnosis.fit.parameter_columns import sensor_column
 from mjchair.diagnosis.fit.process import NAMED, Part, Process
-from mjchair.diagnosis.replay import derivatives
 from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.measured_motion import motions
 from mjchair.diagnosis.replay.noise import EDGES
@@ -59,8 +60,10 @@ def with_shown_noise(
         part: np.full(level.size, given[part]) if part in given else level
         for part, level in shaking.levels.items()
     }
-    columns = {**nuisances, **_smooth(bench, first, pulses, answers), **_sensors(bench, first)}
-    return _estimated(bench, first, replace(shaking, levels=parts), columns)[0]
+    shaking = replace(shaking, levels=parts)
+    shaken = replace(bench, process=shaking)
+    columns = {**nuisances, **_smooth(bench, first, pulses, answers), **_sensors(shaken, first)}
+    return _estimated(bench, first, shaking, columns)[0]
 
 
 def left_by(
@@ -166,23 +169,15 @@ def _sensors(bench: Bench, first: Track) -> dict[ColumnId, Column]:
     for channel in bench.simulator.channels:
         for kind, size in ((SensorError.BIAS, sensor(channel).fault), (SensorError.SCALE, SCALE)):
             key = EffectColumn(EffectGroup(f"sensor_{kind}:{channel}", 0), 0)
-            out[key] = derivatives.sensor_column(bench.simulator, first, kind, channel, size)
+            out[key] = sensor_column(bench, first, kind, channel, size)
     return out
 
 
 def _doubled(bench: Bench) -> Array:
     """2 for both channels of a copied pair, which tell together what one tells, (channels,)."""
     study = bench.simulator.study
-    pairs = {*study.copied, *(_other(c) for c in study.copied)}
+    pairs = {*study.copied, *(other_wheel(c) for c in study.copied)}
     return np.array([2.0 if c in pairs else 1.0 for c in bench.simulator.channels])
-
-
-def _other(channel: str) -> str:
-    """The same channel of the other side."""
-    left, right = "left", "right"
-    if channel.startswith(left):
-        return right + channel.removeprefix(left)
-    return left + channel.removeprefix(right)
 
 
 def _steps(bench: Bench) -> Array:

@@ -6,14 +6,14 @@ In: columns around a track. Out: the linear system of a variant of the chair.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.diagnosis.data.roughly_known import Nuisance
-from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit import bounded, shaken
 from mjchair.diagnosis.fit.column_ids import ColumnId
 from mjchair.diagnosis.fit.process import Process
 from mjchair.diagnosis.fit.system import System, build
@@ -38,6 +38,7 @@ class Bench:
     noise: dict[str, Noise]
     nuisances: tuple[Nuisance, ...]
     process: Process | None = None
+    _shaken: tuple[Track, Column] | None = field(default=None, init=False, repr=False)
 
     @cached_property
     def whitener(self) -> Whitener:
@@ -49,6 +50,34 @@ class Bench:
         """Indices of the windows that may be fitted to."""
         fitted = set(self.simulator.study.fitted)
         return np.array([i for i, w in enumerate(self.simulator.windows) if w.run in fitted])
+
+    def shaken(self, track: Track) -> Column:
+        """What shakes the chair of a track, as every channel would show it by what others tell.
+
+        See `shaken.told_by_others`. That of the last track is kept.
+        """
+        if self._shaken is None or self._shaken[0] is not track:
+            self._shaken = track, self._told_by_others(track)
+        return self._shaken[1]
+
+    def _told_by_others(self, track: Track) -> Column:
+        if self.process is None:
+            return [np.zeros_like(y) for y in track.predicted]
+        return [
+            shaken.told_by_others(self.simulator, track, self.whitener, self.process, i)
+            for i in range(len(self.simulator.windows))
+        ]
+
+    def _shown(self, track: Track, variant: Variant) -> Column:
+        """What the channels show of a variant, (rows, channels) a window.
+
+        A gain of a sensor is also one of what shakes the chair, as far as the other channels tell.
+        """
+        gains = variant.sensor_errors(self.simulator.channels).scale
+        if not gains:
+            return track.predicted
+        by = np.array([gains.get(c, 0.0) for c in self.simulator.channels])
+        return [y + by * s for y, s in zip(track.predicted, self.shaken(track), strict=True)]
 
     def system(
         self,
@@ -73,6 +102,7 @@ class Bench:
             free=free,
             process=self.process,
             only=only,
+            shown=self._shown(track, variant),
         )
         if only is None:
             system.set_cells(bounded.solve(system, self.windows, [])[0][:nuisance])

@@ -93,17 +93,33 @@ def eliminate_window(
       miss: (rows, channels) measured minus predicted, NaN where nothing was measured.
       columns: (rows, channels, p). process: what shakes the chair; None: nothing.
     """
-    free, precision = state_columns(simulator, track, window)
-    stacked = np.concatenate([miss[:, :, None], columns, free], axis=2)
+    stacked = np.concatenate([miss[:, :, None], columns], axis=2)
     # what was not measured, or what a chair that falls over shows, tells nothing
     white = whitener(window, np.nan_to_num(stacked, copy=False, posinf=0.0, neginf=0.0))
-    p, states = columns.shape[2], free.shape[2]
-    Z = white[:, 1 + p :]
+    Z, precision, states = own_columns(simulator, track, whitener, window, process)
+    return eliminate(white[:, 0], white[:, 1:], Z, precision, states)
+
+
+def own_columns(
+    simulator: WindowSimulator,
+    track: Track,
+    whitener: Whitener,
+    window: int,
+    process: Process | None = None,
+) -> tuple[Array, Array, int]:
+    """White columns (samples, k) of a window's state, and of its disturbances.
+
+    Returns:
+      The columns, their prior precisions (k,), and how many, at the start, are the state's.
+    """
+    free, precision = state_columns(simulator, track, window)
+    Z = whitener(window, np.nan_to_num(free, posinf=0.0, neginf=0.0))
+    states = Z.shape[1]
     if process is not None:
         shaken = process.white_columns(window, whitener)
         Z = np.hstack([Z, shaken])
         precision = np.r_[precision, np.ones(shaken.shape[1])]
-    return eliminate(white[:, 0], white[:, 1 : 1 + p], Z, precision, states)
+    return Z, precision, states
 
 
 def state_columns(simulator: WindowSimulator, track: Track, window: int) -> tuple[Array, Array]:

@@ -17,7 +17,9 @@ from mjchair.diagnosis.fit.column_ids import ColumnId, ParameterId, RoughlyKnown
 from mjchair.diagnosis.fit.variant import Variant, nudged
 from mjchair.diagnosis.replay import derivatives
 from mjchair.diagnosis.replay.derivatives import Column, Point
+from mjchair.diagnosis.replay.sensor_errors import SensorErrors
 from mjchair.diagnosis.replay.window_states import Track
+from mjchair.effects.effect import SensorError
 
 STIFF, SOFT = -0.8, 0.67  # of a compliance, by which columns to its two sides are taken
 PART = 0.5  # standard deviations of a nuisance by which its derivative is taken
@@ -53,10 +55,31 @@ def nuisance_columns(bench: Bench, track: Track, variant: Variant) -> dict[Colum
         ]
     for n in bench.nuisances:
         if n.edit is None:
-            out[RoughlyKnown(n.name)] = derivatives.sensor_column(
-                simulator, track, n.error, n.channel, n.std
-            )
+            out[RoughlyKnown(n.name)] = sensor_column(bench, track, n.error, n.channel, n.std)
     return out
+
+
+def sensor_column(
+    bench: Bench,
+    track: Track,
+    kind: SensorError,
+    channel: str,
+    size: float,
+    errors: SensorErrors | None = None,
+) -> Column:
+    """What a bias (SI), a scale (1) or a delay (s) of one channel changes.
+
+    A scale is also one of what shakes the chair, as far as the other channels tell it.
+
+    Args:
+      errors: those of the track's sensors; None: they have none.
+    """
+    shown = track.predicted
+    if kind == SensorError.SCALE:
+        bias, gain = (errors.bias, errors.scale) if errors else ({}, {})
+        less, by = bias.get(channel, 0.0), 1.0 + gain.get(channel, 0.0)
+        shown = [(y - less) / by + s for y, s in zip(shown, bench.shaken(track), strict=True)]
+    return derivatives.sensor_column(bench.simulator, shown, kind, channel, size)
 
 
 def _sides(
@@ -141,9 +164,8 @@ def term_columns(
         for key, parameter in term.parameters:
             effect = term.effect
             if effect.sensor is not None:
-                out[key] = derivatives.sensor_column(
-                    simulator, track, effect.sensor, str(effect.channel), parameter.change
-                )
+                channel, size = str(effect.channel), parameter.change
+                out[key] = sensor_column(bench, track, effect.sensor, channel, size, errors)
                 continue
             beside, factor = nudged(variant, term, parameter, (known or {}).get(key), side)
             unchanged = simulator.without_motion(effect.measured)

@@ -95,6 +95,7 @@ def build(
     whitener: Whitener,
     columns: Mapping[ColumnId, Column],
     *,
+    shown: Column,
     nuisance: int,
     offsets: Mapping[str, float],
     free: int = 0,
@@ -105,6 +106,7 @@ def build(
 
     Args:
       columns: (rows, channels) a window; nuisances first, scaled by their priors.
+      shown: what the channels show of the chair of the track, (rows, channels) a window.
       nuisance: how many are. offsets: where nuisances already are, in standard deviations.
       free: how many of the nuisances, the last, are effects that are in.
       process: what shakes the chair; None: nothing.
@@ -121,7 +123,7 @@ def build(
     for i, w in enumerate(simulator.windows):
         if only is not None and i not in only:
             continue
-        miss = residual(simulator.measured(w), track.predicted[i], simulator.channels)
+        miss = residual(simulator.measured(w), shown[i], simulator.channels)
         stacked = np.stack([columns[n][i] for n in ids], axis=2)
         window = eliminate_window(simulator, track, whitener, i, miss, stacked, process)
         G[i], b[i], c[i] = window.G, window.b, window.chi2

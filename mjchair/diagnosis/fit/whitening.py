@@ -61,6 +61,16 @@ class Whitener:
         there = self.there[window]
         return np.vstack([w.T @ values[there[:, i], i] for i, w in enumerate(self.waves[window])])
 
+    def samples(self, window: int, channel: int, amplitudes: Array) -> Array:
+        """Samples (rows,) of one channel that have these whitened amplitudes (n,).
+
+        They are 0 where nothing was measured.
+        """
+        waves = self.waves[window][channel]
+        out = np.zeros(len(self.there[window]))
+        out[self.there[window][:, channel]] = waves @ (amplitudes / (waves * waves).sum(axis=0))
+        return out
+
     def slow(self, window: int, highest: float) -> list[NDArray[np.int64]]:
         """Rows of each channel whose cosines are below a frequency (Hz), two at least."""
         out = []

@@ -121,12 +121,20 @@ def other_integrator(spec: mujoco.MjSpec) -> None:
 
 
 def sensor_column(
-    simulator: WindowSimulator, track: Track, kind: SensorError, channel: str, size: float
+    simulator: WindowSimulator,
+    predicted: Column,
+    kind: SensorError,
+    channel: str,
+    size: float,
 ) -> Column:
-    """What a bias (SI), a scale (1) or a delay (s) of one channel changes."""
+    """What a bias (SI), a scale (1) or a delay (s) of one channel changes.
+
+    Args:
+      predicted: what the channels show before this error.
+    """
     which = list(simulator.channels).index(channel)
     out = []
-    for w, y in zip(simulator.windows, track.predicted, strict=True):
+    for w, y in zip(simulator.windows, predicted, strict=True):
         column = np.zeros_like(y)
         if kind == SensorError.BIAS:
             column[:, which] = size
