@@ -12,8 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-
-import numpy as np
+from functools import partial
 
 from mjchair.diagnosis.explain import hypotheses, whole_sizes
 from mjchair.diagnosis.explain.candidates import Start
@@ -21,7 +20,7 @@ from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.explain.whole_sizes import Seen
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.nonlinear import Fitted
-from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.diagnosis.fit.variant import Variant
 from mjchair.diagnosis.replay.window_states import Track
 
 
@@ -34,18 +33,12 @@ def fits(base: Base, single: Fitted, best: Fitted) -> Iterator[tuple[tuple[Start
     """
     windows = whole_sizes.worst_windows(base, single)
     around = base.around
-    nothing = _with_best(base, around.variant, around.track, windows, base.starts).chi2
+    nothing = _with_best(base, windows, base.starts, around.variant, around.track).chi2
     most = nothing - whole_sizes.chi2(base, best.variant, best.track, windows)
     for start in whole_sizes.starts(base):
         others = [s for s in base.starts if s.effect.key != start.effect.key]
-
-        def look(term: Term, others: Sequence[Start] = others) -> Seen:
-            variant = replace(around.variant, terms=(term,))
-            here = whole_sizes.track_of(base, variant, windows)
-            if here is None:
-                return Seen(np.inf, variant)
-            return _with_best(base, variant, here, windows, others)
-
+        weigh = partial(_with_best, base, windows, others)
+        look = partial(whole_sizes.looked_at, base, windows, weigh)
         for seen in whole_sizes.best_sizes(start, look, nothing, most):
             made = whole_sizes.fit_from(base, seen.variant, windows)
             if made is not None:
@@ -53,7 +46,7 @@ def fits(base: Base, single: Fitted, best: Fitted) -> Iterator[tuple[tuple[Start
 
 
 def _with_best(
-    base: Base, variant: Variant, here: Track, windows: Sequence[int], others: Sequence[Start]
+    base: Base, windows: Sequence[int], others: Sequence[Start], variant: Variant, here: Track
 ) -> Seen:
     """A chair with the single one of other effects that fits these windows best, if any does.
 

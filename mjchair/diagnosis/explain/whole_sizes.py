@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -64,17 +65,29 @@ def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitte
     windows = worst_windows(base, base.plain)
     nothing = chi2(base, base.plain.variant, base.plain.track, windows)
     most = nothing - chi2(base, other.variant, other.track, windows) if other else 0.0
+
+    def weigh(variant: Variant, here: Track) -> Seen:
+        return Seen(chi2(base, variant, here, windows), variant)
+
+    look = partial(looked_at, base, windows, weigh)
     for start in starts(base):
-
-        def look(term: Term) -> Seen:
-            variant = replace(base.around.variant, terms=(term,))
-            here = track_of(base, variant, windows)
-            return Seen(np.inf if here is None else chi2(base, variant, here, windows), variant)
-
         for begin in best_sizes(start, look, nothing, most):
             made = fit_from(base, begin.variant, windows)
             if made is not None:
                 yield start, made
+
+
+def looked_at(
+    base: Base, windows: Sequence[int], weigh: Callable[[Variant, Track], Seen], term: Term
+) -> Seen:
+    """Windows of a chair with an effect at a size; of infinite chi2 where no chair is so.
+
+    Args:
+      weigh: a chair and its track.
+    """
+    variant = replace(base.around.variant, terms=(term,))
+    here = track_of(base, variant, windows)
+    return Seen(np.inf, variant) if here is None else weigh(variant, here)
 
 
 def starts(base: Base) -> Iterator[Start]:
