@@ -93,6 +93,16 @@ def test_a_size_that_no_chair_can_have_fits_nothing():
     assert whole_sizes.track_of(base, Variant(()), [0]) is None
 
 
+def test_a_size_whose_linear_algebra_fails_fits_nothing(monkeypatch):
+    def fails(*_):
+        raise np.linalg.LinAlgError
+
+    monkeypatch.setattr(whole_sizes, "track_of", lambda *_: "a track")
+    base = SimpleNamespace(around=SimpleNamespace(variant=Variant(())))
+    term = Term(find("turning_scrub"), {"moment": 4.0}, ("moment",))
+    assert whole_sizes.looked_at(base, [0], fails, term).chi2 == math.inf
+
+
 def test_whole_sizes_are_sizes_that_can_be():
     for effect in MECHANICAL:
         for p in effect.parameters:

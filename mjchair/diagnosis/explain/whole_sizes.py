@@ -87,7 +87,11 @@ def looked_at(
     """
     variant = replace(base.around.variant, terms=(term,))
     here = track_of(base, variant, windows)
-    return Seen(np.inf, variant) if here is None else weigh(variant, here)
+    nothing = Seen(np.inf, variant)
+    try:
+        return nothing if here is None else weigh(variant, here)
+    except np.linalg.LinAlgError:  # of a chair that hardly simulates
+        return nothing
 
 
 def starts(base: Base) -> Iterator[Start]:
