@@ -126,6 +126,11 @@ def per_cent(share: float) -> str:
     return f"{100.0 * share:.0f} %"
 
 
+def probable(share: float) -> str:
+    """A probability as it is written everywhere: of what data tell none is whole."""
+    return "more than 99 %" if share >= 0.995 else per_cent(share)
+
+
 def factor(unit: str) -> float:
     """What a number in a unit of UNITS is multiplied by to be in SI; 1 for no unit."""
     return UNITS[unit][1] if unit else 1.0

@@ -332,3 +332,32 @@ def test_a_slalom_at_an_even_speed_says_nothing_of_an_accelerometer(sides, tmp_p
         felt = {"imu_accelerometer.x": sign * 0.12 * np.cos(2.0 * np.pi * TIME)}
         write(tmp_path / f"study{sign:g}", columns | felt)
         read_study(tmp_path / f"study{sign:g}")
+
+
+@pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        (
+            {side: 2.0 + 0.4 * TIME for side in SIDES},
+            "it gains 0.4[0-9] m/s and no torque is given",
+        ),
+        ({side: 3.0 - 0.4 * TIME for side in SIDES}, None),
+        ({side: -3.0 + 0.4 * TIME for side in SIDES}, "rolls backward all along, by 2.[5-7] m"),
+        ({side: -1.0 + 0.4 * TIME for side in SIDES}, None),  # to and fro
+    ],
+)
+def test_a_run_that_nothing_drives_or_that_rolls_back_is_noted(columns, said, tmp_path):
+    """Somebody pushed gently (0.12 m/s^2), or both signs are turned."""
+    write(tmp_path / "study", {f"{side}_wheel_speed": rolls for side, rolls in columns.items()})
+    notes = [n for n in read_study(tmp_path / "study").notes if "gains" in n or "backward" in n]
+    assert len(notes) == (said is not None)
+    assert said is None or re.search(said, notes[0])
+
+
+def test_torques_of_a_rim_that_nobody_holds_give_no_speed(tmp_path):
+    rolls = {f"{side}_wheel_speed": 2.0 + 0.4 * TIME for side in SIDES}
+    for size, noted in ((0.3, True), (4.0, False)):
+        held = {f"{side}_wheel": np.full(TIME.size, size) for side in SIDES}
+        write(tmp_path / f"{size}", rolls | held, head=HEAD + 'torque = "measured"\n')
+        notes = read_study(tmp_path / f"{size}").notes
+        assert any("no torque is given" in n for n in notes) == noted

@@ -8,6 +8,8 @@ import mjchair
 from mjchair.effects import bearing_friction, rolling_resistance, toe
 from mjchair.effects.library import MECHANICAL, find, library, names
 from mjchair.errors import MjchairError
+from mjchair.model import parts
+from mjchair.tire import block
 
 CONTRACT = {
     "rolling_resistance": {"coefficient"},
@@ -288,3 +290,20 @@ def test_wheels_lean_outwards_no_further_than_a_bent_axle():
     assert camber.on(spec).parameter("angle").low == pytest.approx(-0.05, abs=1e-9)
     camber.apply(spec, {"angle": 0.2})
     assert camber.on(spec).parameter("angle").low == pytest.approx(-0.25, abs=1e-9)
+
+
+PLACE = block.ROLLING_RESISTANCE
+
+
+def test_rolling_resistance_takes_away_what_the_tires_have_and_no_more():
+    """A report said -0.0108 where the rear tires have 0.010, and the corrected chair had 0."""
+    spec = mjchair.load_spec()
+    has = {w: parts.tire_geom(spec, w).userdata[PLACE] for w in parts.REAR}
+    of_all, of_one = (e.on(spec) for e in MECHANICAL if e.name == "rolling_resistance")
+    low = of_all.parameter("coefficient").low
+    assert low == -min(*has.values(), parts.tire_geom(spec, parts.CASTERS[0]).userdata[PLACE])
+    assert of_one.parameter("left").low == -has[parts.REAR[0]]
+    of_all.apply(spec, {"coefficient": low})
+    left = [parts.tire_geom(spec, w).userdata[PLACE] for w in (*parts.REAR, *parts.CASTERS)]
+    assert min(left) == 0.0
+    assert sum(left) == pytest.approx(2.0 * (0.015 - 0.010))

@@ -214,7 +214,7 @@ def test_noise_that_is_larger_than_the_study_says_is_told(monkeypatch):
     of = {"a": 0.0046, "b": 0.004, "c": 0.2}
     noise = {c: SimpleNamespace(total=v, source="study.toml") for c, v in of.items()}
     study = SimpleNamespace(notes=[], unplaced=(), copied=(), noise={"a": 0.0005, "b": 0.0041})
-    bench = SimpleNamespace(simulator=SimpleNamespace(study=study), noise=noise)
+    bench = SimpleNamespace(simulator=SimpleNamespace(study=study), noise=noise, tipped={})
     gains = [
         Nuisance(f"scale:{c}", 0.01, "1", None, c, SensorError.SCALE) for c in ("fine", "faulty")
     ]

@@ -273,7 +273,9 @@ def test_what_an_answer_leaves_is_said():
         ({"said": Verdict.AMBIGUOUS, "sigmas": rules.CERTAIN + 0.1}, True),
         ({"said": Verdict.UNKNOWN, "sigmas": rules.CERTAIN + 0.1}, False),
         # what nothing explains and does not make the residual larger than noise
-        ({"force": 4.0, "excess": 1.9}, False),
+        ({"force": 4.0, "excess": 1.9, "probability": 0.49}, False),
+        # but what is rather there matters, though it explains too little to be an answer
+        ({"force": 4.0, "excess": 1.9}, True),
         ({"force": 4.0, "excess": 1.9, "gap": rules.SMALL_GAP}, True),
         # a wind of 3 m/s on another chair, with a probability of 0.22
         ({"force": 6.8, "excess": 1.9, "p": 1.5e-15}, True),
@@ -294,10 +296,10 @@ def test_what_an_answer_leaves_is_said():
             },
             True,
         ),
-        ({"force": 4.0, "excess": 1.9, "freed": True}, False),
+        ({"force": 4.0, "excess": 1.9, "freed": True, "probability": 0.49}, False),
         # where nothing is the most probable, the residual must show as clearly as a gap does
-        ({"force": 4.0, "excess": 4.9, "nothing": True}, False),
-        ({"force": 4.0, "excess": 5.1, "nothing": True}, True),
+        ({"force": 4.0, "excess": 4.9, "nothing": True, "probability": 0.1}, False),
+        ({"force": 4.0, "excess": 5.1, "nothing": True, "probability": 0.1}, True),
         ({"force": 4.0, "excess": 4.9, "nothing": True, "said": Verdict.NAMED}, True),
     ],
 )

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from mjchair.commands import options
 from mjchair.errors import MjchairError, note
-from mjchair.units import per_cent
+from mjchair.units import probable
 
 if TYPE_CHECKING:
     from mjchair.diagnosis.data.study import Study
@@ -215,8 +215,8 @@ def _likely(found: Diagnosis) -> str:
         return ""
     if found.effects:
         likely = of_effects(found.probability, [e.key for e in found.effects])
-        return f"; probability {per_cent(likely)}"
+        return f"; probability {probable(likely)}"
     nothing = found.probability.get(NONE, 0.0)
     if nothing < LIKELY:
         return "; what is left is too small to matter"
-    return f"; probability that nothing is missing {per_cent(nothing)}"
+    return f"; probability that nothing is missing {probable(nothing)}"

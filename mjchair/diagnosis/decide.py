@@ -93,7 +93,8 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         )
     said = rules.verdict(gap.exists, stands)
     forces = missing_forces(base)
-    answer = None if said == Verdict.UNKNOWN else choice
+    likely = of_any(probability, _standing_keys(choice)) if choice else 0.0
+    answer = choice if said != Verdict.UNKNOWN or rules.is_likely(likely) else None
     size = material(base, gap, answer, sure_alone)
     if not rules.matters(
         force=size.value,
@@ -104,11 +105,13 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         told=base.bench.simulator.study.material is not None,
         said=said,
         sigmas=min(stands.sigmas, default=0.0) if stands else 0.0,
-        probability=of_any(probability, _standing_keys(choice)) if choice else 0.0,
+        probability=likely,
         nothing=max(probability, key=probability.__getitem__) == NONE,
         freed=bool(choice and _walls(base.plain) and not _walls(choice.fitted)),
     ):
         said = Verdict.NONE
+    if said == Verdict.NONE and base.bench.tipped:  # what keeps the person's chair down is missing
+        said = Verdict.UNKNOWN
     if (said == Verdict.UNKNOWN and choice is None) or rules.surely(chance):
         probability = with_gap(probability, chance)
     if alone is not None and not rules.says_one_run(said, alike=alone.alike):

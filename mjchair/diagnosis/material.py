@@ -36,7 +36,8 @@ def material(base: Base, gap: Gap, choice: Choice | None, alone: InOneRun | None
     The force is the one that does what the answer does: the chosen effects, or where there is none
     the force that the tests see best: effects that explain little of a push that somebody gave are
     no measure of it. Of an effect that makes a wheel slide or shimmy no column
-    tells how large that is, so it counts as larger than any limit.
+    tells how large that is, and errors of sensors alone are no force, though a moment may look like
+    the gain of a gyroscope: these count as larger than any limit.
 
     Args:
       choice: of effects, where it is an answer.
@@ -45,7 +46,7 @@ def material(base: Base, gap: Gap, choice: Choice | None, alone: InOneRun | None
     study = base.bench.simulator.study
     if alone is not None:
         return Material(_of_one_run(base, alone.acting), limit(study))
-    if choice is not None and _is_of_whole_size(choice):
+    if choice is not None and (_is_of_whole_size(choice) or _is_of_sensors(choice)):
         return Material(float("inf"), limit(study))
     return Material(largest(base, _explaining(base, gap, choice)), limit(study))
 
@@ -53,6 +54,11 @@ def material(base: Base, gap: Gap, choice: Choice | None, alone: InOneRun | None
 def _is_of_whole_size(choice: Choice) -> bool:
     """Whether a chosen effect has sizes at which a chair does what no small change foretells."""
     return any(p.whole for term in choice.fitted.variant.terms for _, p in term.parameters)
+
+
+def _is_of_sensors(choice: Choice) -> bool:
+    """Whether errors of sensors are all that was chosen."""
+    return all(term.effect.sensor is not None for term in choice.fitted.variant.terms)
 
 
 def limit(study: Study) -> float:

@@ -6,6 +6,7 @@ In: the chair as it was with its gap, the choice of effects and the verdict. Out
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import event
@@ -16,6 +17,7 @@ from mjchair.diagnosis.explain.one_run import InOneRun
 from mjchair.diagnosis.explain.run_by_run import Uneven
 from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.variant import Term
@@ -62,6 +64,7 @@ def notes_on(
             )
         elif given is None and channel not in study.copied:
             notes.append(f"noise of {channel}: {noise.total:.3g} (SI), from {noise.source}")
+    notes += _of_tipping(base.bench)
     notes += base.dropped
     notes += choice.dropped if choice else []
     notes += [
@@ -91,6 +94,19 @@ def notes_on(
             "body, and what of the rider moves, and how heavy it is, these channels do not tell"
         )
     return notes
+
+
+def _of_tipping(bench: Bench) -> Iterator[str]:
+    """What is left out since the chair tips there, where no channel shows that it did."""
+    for i, lean in bench.tipped.items():
+        w = bench.simulator.windows[i]
+        yield (
+            f"{bench.simulator.study.runs[w.run].trial.name}: between {w.first:.3g} and "
+            f"{w.last:.3g} s the chair of the model tips, by {math.degrees(lean):.2g} degrees, and "
+            "nothing of this is fitted to; a person leans forward under a hard push: measure how "
+            "they move (docs/rider.md), or see whether [chair] has the axle and the centre of mass "
+            "where they are"
+        )
 
 
 def _of_gains(fitted: Fitted) -> list[str]:

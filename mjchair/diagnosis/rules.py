@@ -358,6 +358,11 @@ def more_missing(choice: Standing) -> bool:
     return choice.gap_left or choice.closure < CLOSES or choice.walls > 0 or choice.uneven or wrong
 
 
+def is_likely(probability: float) -> bool:
+    """Whether effects are rather there than not, also where they are no answer."""
+    return probability >= LIKELY
+
+
 def matters(
     *, force: float, limit: float, gap: float, excess: float, p: float, told: bool, said: Verdict,
     sigmas: float, probability: float, nothing: bool = False, freed: bool = False,
@@ -373,7 +378,8 @@ def matters(
       p: of the gap, by chance, or of what surely acts in one run alone; one of SURELY shows,
         whatever the whole residual does.
       told: whether the person who asks gave the limit.
-      probability: that an effect of the answer is there.
+      probability: that an effect of the answer is there, or of what is rather there but explains
+        too little to be one.
       nothing: whether that nothing is missing is more probable than any one explanation; then the
         whole residual must show as clearly as a gap does.
       freed: whether numbers that are only roughly known stand on their walls without the answer,
@@ -381,7 +387,7 @@ def matters(
       sigmas: of the least certain effect. Without a limit that was told, what is CERTAIN
         matters whatever its size, and a gap of twice the noise is one though no force goes with it.
     """
-    answered = said != Verdict.UNKNOWN and (probability >= LIKELY or freed)
+    answered = is_likely(probability) or (said != Verdict.UNKNOWN and freed)
     shows = LEAST if nothing else SHOWS
     unclear = excess < shows and gap < SMALL_GAP and not surely(p)
     if not answered and not told and unclear:

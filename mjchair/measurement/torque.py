@@ -33,5 +33,5 @@ def check_torques(controls: Mapping[str, Array], source: str) -> None:
             raise MjchairError(
                 f"{source}: {name} looks like N mm: it reaches {size:.4g}, and neither hand nor "
                 f"motor passes {TORQUE:g} N m; give SI, or the unit in its header, as in "
-                f"{name} [N mm]"
+                f"{name} [N mm] or {name} [N cm]"
             )

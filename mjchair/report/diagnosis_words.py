@@ -26,7 +26,7 @@ from mjchair.diagnosis.result import (
     OneRun,
 )
 from mjchair.diagnosis.rules import LEVEL, LIKELY, PARTLY, PROBABLE, Verdict
-from mjchair.units import per_cent, with_unit
+from mjchair.units import per_cent, probable, with_unit
 
 LEAST = 1e-6  # a chance below this is said to be below it
 # what a force may go with that is not known where nothing tells how the chair turns
@@ -298,11 +298,11 @@ def _probabilities(diagnosis: Diagnosis) -> str:
 
 
 def _stated(explanation: Explanation) -> str:
-    alone, more = 100.0 * explanation.alone, 100.0 * explanation.more
+    alone, more = explanation.alone, explanation.more
     words = hypothesis_words(explanation.name)
     if explanation.more < UNSURE:
-        return f"{alone:.0f} % {words}"
-    return f"{alone + more:.0f} % {words} ({alone:.0f} % with nothing more)"
+        return f"{probable(alone)} {words}"
+    return f"{probable(alone + more)} {words} ({probable(alone)} with nothing more)"
 
 
 class Explanation(NamedTuple):
@@ -471,7 +471,7 @@ def _open_words(diagnosis: Diagnosis) -> str:
     likely = of_effects(diagnosis.probability, [e.key for e in diagnosis.effects])
     if likely < PROBABLE:
         told = min(likely, PROBABLE - 0.01)  # 94.6 % is no 95 %
-        return f"It is one explanation that fits. Its probability is {per_cent(told)}, below 95 %."
+        return f"It is one explanation that fits. Its probability is {probable(told)}, below 95 %."
     return (
         "It is one explanation that fits. What it leaves, or how well its numbers are known, is "
         "not enough to name it."

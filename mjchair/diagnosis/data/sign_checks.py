@@ -30,6 +30,8 @@ PULLED = 0.3  # m/s^2, as a slope of 3 %
 TOLD = 0.3  # of a torque, in rms, that must go with speed and its gain (0.34 of one in strokes)
 ALIKE = 0.5  # of their sum: torques whose difference is less are alike (rms)
 ASIDE = 0.2  # of their sum: a centre of mass 55 mm aside turns a chair as much as such a difference
+FORWARD, BACK = 0.1, 1.0  # m/s and m: a chair that is never faster, and rolls back by more
+IDLE = 1.0  # N m, of a rim that nobody holds
 WORK = 40.0  # J that torques take from a chair, more than it lost: a sign may be wrong (assumption)
 SIDES = ("left", "right")
 
@@ -49,12 +51,13 @@ def check(trial: Trial, axle: RearAxle, mass: float) -> list[str]:
     for name, story in stories.items():
         if "wheels" in stories and name != "wheels":
             _check_spin(trial, axle, (name, story), stories["wheels"])
+    said = _backward(trial, axle) + _gains(trial, axle)
     if trial.inputs is None:
-        return _undriven(trial, axle)
+        return said
     if {f"{side}_wheel" for side in SIDES} <= set(trial.inputs.controls):
         _check_equal(trial, trial.inputs, axle, stories.get("wheels"))
         _check_moment(trial, trial.inputs, stories)
-    return _torque(trial, trial.inputs, axle, mass)
+    return said + _torque(trial, trial.inputs, axle, mass)
 
 
 def _check_pair(trial: Trial, names: tuple[str, str], stories: tuple[Story, Story]) -> None:
@@ -176,17 +179,42 @@ def gained_undriven(trial: Trial, axle: RearAxle) -> tuple[str, float] | None:
     return None
 
 
-def _undriven(trial: Trial, axle: RearAxle) -> list[str]:
-    """A note where a chair gains speed that nothing gives it."""
-    found = gained_undriven(trial, axle)
-    if found is None:
+def _backward(trial: Trial, axle: RearAxle) -> list[str]:
+    """A note where a chair only rolls backward: each of its signs may be turned."""
+    for name, story in forward(trial, axle).items():
+        if story.time.size < 8 or story.values.max() > FORWARD:
+            continue
+        back = -float(np.trapezoid(story.values, story.time))
+        if back > BACK:
+            return [
+                f"{trial.name}: by {name} the chair rolls backward all along, by {back:.2g} m; if "
+                "it went forward, turn the signs of its wheels and of its torques"
+            ]
+    return []
+
+
+def _gains(trial: Trial, axle: RearAxle) -> list[str]:
+    """A note where a chair gains speed that no torque gives it."""
+    if trial.inputs is not None and not _is_still(trial.inputs):
         return []
-    name, gained = found
-    return [
-        f"{trial.name}: by {name} it gains {gained:.2g} m/s and no torque is given, so it "
-        "is taken to coast; give left_wheel and right_wheel, or only what follows the last "
-        "push"
-    ]
+    for name, story in forward(trial, axle).items():
+        if story.time.size < 8:
+            continue
+        speed = np.abs(story.values)
+        gained = float(np.max(speed - np.minimum.accumulate(speed)))
+        if gained > PUSHED:
+            return [
+                f"{trial.name}: by {name} it gains {gained:.2g} m/s and no torque is given, so "
+                "it is taken to coast, down a slope or before a wind; if somebody pushed it, give "
+                "left_wheel and right_wheel, or only what follows the last push"
+            ]
+    return []
+
+
+def _is_still(inputs: Inputs) -> bool:
+    """Whether the torques of both wheels are no more than the offset of a sensor."""
+    wheels = [name for name in inputs.controls if name.endswith("_wheel")]
+    return all(np.nanmax(np.abs(inputs.samples(name)[1])) < IDLE for name in wheels)
 
 
 def _torque(trial: Trial, inputs: Inputs, axle: RearAxle, mass: float) -> list[str]:
@@ -214,7 +242,8 @@ def _torque(trial: Trial, inputs: Inputs, axle: RearAxle, mass: float) -> list[s
     if all(_brakes_as_it_gains(story, torque) for story, torque in pulls):
         raise MjchairError(
             f"{said}, and it gains speed the more they brake: positive torque drives forward; "
-            "turn their signs"
+            "turn their signs, or those of the wheels where these count down as the chair rolls "
+            "forward"
         )
     return [
         f"{said}: positive torque drives forward; turn their signs, unless the way goes downhill"

@@ -129,7 +129,7 @@ def _check_rates(trial: Trial, axle: RearAxle) -> None:
             continue
         limit, fastest = limit_of(name, kind.fastest, axle), _fastest(trial, name)
         if fastest > limit:
-            why = f"it turns by {fastest:.3g} a second, and no chair passes {limit:.3g} rad/s"
+            why = f"it changes by {fastest:.3g} a second, and no chair passes {limit:.3g} rad/s"
             _refuse(trial, name, "degrees", why, "deg")
         first = abs(float(trial.samples(name)[1][0]))
         if kind.wraps and first > TURN:

@@ -219,7 +219,9 @@ def held_windows(base: Base) -> NDArray[np.int64]:
 
 def _windows_of(base: Base, runs: Collection[int]) -> NDArray[np.int64]:
     """The windows of some runs."""
-    return np.array([i for i, w in enumerate(base.bench.simulator.windows) if w.run in runs], int)
+    bench = base.bench
+    every = [i for i, w in enumerate(bench.simulator.windows) if w.run in runs]
+    return np.array([i for i in every if i not in bench.tipped] or every, int)
 
 
 def plain_gap(base: Base) -> Gap:

@@ -133,7 +133,7 @@ def _estimated(
     shown = replace(shown, bands=shown.bands * _doubled(bench)[:, None])
     noise = noise_levels.with_levels(bench.noise, simulator.channels, _steps(bench), shown)
     process = replace(shaking, levels=shown.parts, wobbles=shown.wobbles)
-    return Bench(simulator, noise, bench.nuisances, process), how_far
+    return replace(bench, noise=noise, process=process), how_far
 
 
 def _most(simulator: WindowSimulator) -> dict[Part, Array]:

@@ -29,7 +29,7 @@ from mjchair.diagnosis.fit.nonlinear import Fitted, on_bound, refit
 from mjchair.diagnosis.fit.parameter_columns import nuisance_columns
 from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.fit.variant import Term, Variant
-from mjchair.diagnosis.replay import noise, noise_left
+from mjchair.diagnosis.replay import noise, noise_left, tipping
 from mjchair.diagnosis.replay.cache import Store
 from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.pulses import pulse_answers, pulses
@@ -113,7 +113,9 @@ def prepare(
     if any(first_state.stops(run) for run in study.runs):
         given.setdefault("bias:imu_accelerometer.x", AT_REST)
     nuisances = roughly_known.nuisances(study.channels, given, study.driven_as_measured)
-    return Bench(simulator, noise_left.refined(simulator, first, known), nuisances), first
+    noises = noise_left.refined(simulator, first, known)
+    tips = tipping.tipped(simulator, first)
+    return Bench(simulator, noises, nuisances, tipped=tips), first
 
 
 def screen_columns(

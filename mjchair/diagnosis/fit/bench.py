@@ -32,12 +32,14 @@ class Bench:
     Attributes:
       simulator: of the windows. noise: of the channels. nuisances: of the study.
       process: what shakes the chair in the windows; None: nothing.
+      tipped: windows in which the chair tips unseen, with its largest lean there, rad.
     """
 
     simulator: WindowSimulator
     noise: dict[str, Noise]
     nuisances: tuple[Nuisance, ...]
     process: Process | None = None
+    tipped: Mapping[int, float] = field(default_factory=dict)
     _shaken: tuple[Track, Column] | None = field(default=None, init=False, repr=False)
 
     @cached_property
@@ -47,9 +49,10 @@ class Bench:
 
     @cached_property
     def windows(self) -> NDArray[np.int64]:
-        """Indices of the windows that may be fitted to."""
+        """Indices of the windows that may be fitted to: those that tip only where all do."""
         fitted = set(self.simulator.study.fitted)
-        return np.array([i for i, w in enumerate(self.simulator.windows) if w.run in fitted])
+        every = [i for i, w in enumerate(self.simulator.windows) if w.run in fitted]
+        return np.array([i for i in every if i not in self.tipped] or every)
 
     def shaken(self, track: Track) -> Column:
         """What shakes the chair of a track, as every channel would show it by what others tell.

@@ -9,7 +9,7 @@ from mjchair.diagnosis.result import Diagnosis
 from mjchair.report.colours import AFTER, FAINT
 from mjchair.report.diagnosis_words import explanations, hypothesis_words
 from mjchair.report.figure import Figure
-from mjchair.units import per_cent
+from mjchair.units import probable
 
 MOST = 8  # bars; the rest is one more
 LEAST = 0.005  # a probability below this has no bar of its own
@@ -38,7 +38,7 @@ def figure(diagnosis: Diagnosis) -> Figure | None:
     ax = drawn.subplots()
     ax.barh(names, [100.0 * v for v in values], color=colours)
     for k, value in enumerate(values):
-        ax.text(100.0 * value + 1.0, k, per_cent(value), va="center", fontsize=9)
+        ax.text(100.0 * value + 1.0, k, probable(value), va="center", fontsize=9)
     ax.set_xlim(0.0, 112.0)
     ax.set_xticks([0, 20, 40, 60, 80, 100])
     ax.set_xlabel("probability (%)")

@@ -1,0 +1,58 @@
+"""Windows in which the chair of the model tips, and no channel shows it."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mjchair.diagnosis.fit.bench import Bench
+from mjchair.diagnosis.replay import tipping
+
+
+def turned(axis, angles):
+    """Quaternions (n, 4) of turns by angles (n,) rad about an axis."""
+    half = 0.5 * np.asarray(angles)
+    return np.column_stack([np.cos(half), np.sin(half)[:, None] * np.asarray(axis)])
+
+
+def simulator(*channels):
+    """A study of one run in two windows."""
+    run = SimpleNamespace(trial=SimpleNamespace(channels=dict.fromkeys(channels)))
+    study = SimpleNamespace(runs=[run], fitted=(0,))
+    return SimpleNamespace(study=study, windows=[SimpleNamespace(run=0)] * 2)
+
+
+def track(*leans):
+    """A track of windows with a chair that leans back by so much (rad) and comes down again."""
+    traces = [turned([0.0, 1.0, 0.0], [0.0, -lean, 0.0]) for lean in leans]
+    return SimpleNamespace(trace=[{"qpos": np.hstack([np.zeros((3, 3)), q])} for q in traces])
+
+
+@pytest.mark.parametrize("axis", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.6, 0.8, 0.0]])
+def test_the_lean_is_the_angle_about_any_level_axis(axis):
+    found = tipping.largest_lean(turned(axis, [0.1, 0.05, -0.2]))
+    assert found == pytest.approx(0.3, abs=1e-9)
+
+
+def test_a_chair_that_turns_on_the_floor_does_not_lean():
+    assert tipping.largest_lean(turned([0.0, 0.0, 1.0], [0.0, 1.0, 3.0])) < 1e-7
+
+
+def test_a_window_that_tips_is_no_window_to_fit_to():
+    tips = tipping.tipped(simulator("left_wheel_speed"), track(0.1, 0.005))
+    assert tips == {0: pytest.approx(0.1)}
+    assert Bench(simulator(), {}, (), tipped=tips).windows.tolist() == [1]
+
+
+def test_where_all_tip_all_are_fitted_to():
+    assert Bench(simulator(), {}, (), tipped={0: 0.1, 1: 0.1}).windows.tolist() == [0, 1]
+
+
+def test_a_gyroscope_that_shows_the_lean_tells_what_it_was():
+    assert tipping.tipped(simulator("imu_gyro.y"), track(0.1, 0.1)) == {}
+
+
+def test_strokes_do_not_count_as_tipping():
+    """R = 0.3 m, 87 kg: strokes of up to 20 N m a wheel lean the shipped chair by 0.4 degrees."""
+    assert tipping.tipped(simulator(), track(math.radians(0.4), math.radians(2.9))) == {}
