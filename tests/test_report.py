@@ -634,3 +634,10 @@ def test_what_is_roughly_known_of_a_sensor_is_in_words():
     names = ("centre_x", "bias:imu_gyro.z", "scale:left_wheel_speed")
     said = ["centre x", "bias of imu_gyro.z", "gain of left_wheel_speed"]
     assert [words.roughly_known(name) for name in names] == said
+
+
+def test_a_model_that_tips_where_nothing_shows_it_is_said_first():
+    """It was a payload of -30 kg, and then a force outside the library."""
+    tips = dataclasses.replace(diagnosis(Verdict.UNKNOWN), tipped=["sprint"])
+    assert words.missing(tips).startswith("In sprint the chair of the model tips, ")
+    assert tips.to_dict()["tipped"] == ["sprint"]

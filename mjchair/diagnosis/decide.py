@@ -141,6 +141,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         drivers=left,
         nearest=_nearest(base, choice, closed) if choice and said == Verdict.UNKNOWN else None,
         one_run=_in_one_run(alone, gap) if alone else None,
+        tipped=_tipped(base),
         probability=probability,
         more_missing=bool(named and stands and rules.more_missing(stands)),
         material=size,
@@ -150,6 +151,13 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         evidence=evidence(base, named.fitted if named else None, plan, forces),
         stages=Stages(base=base, gap=gap, choice=choice),
     )
+
+
+def _tipped(base: Base) -> list[str]:
+    """The runs in which the chair of the model tips, and no channel shows that the real one did."""
+    simulator = base.bench.simulator
+    runs = {simulator.windows[i].run for i in base.bench.tipped}
+    return [simulator.study.runs[k].trial.name for k in sorted(runs)]
 
 
 def _in_one_run(found: InOneRun, gap: Gap) -> OneRun:
@@ -295,6 +303,8 @@ def _following(
             return " ".join(told)
     if said == Verdict.UNKNOWN and alone is not None:
         return wording.leaving_out(alone.trial)
+    if said == Verdict.UNKNOWN and base.bench.tipped:
+        return wording.keeping_down()
     if said == Verdict.UNKNOWN:
         lone = lone_run(base, choice.fitted if choice else base.plain)
         if lone is not None:

@@ -363,6 +363,7 @@ class Diagnosis:
       nearest: the explanation that comes nearest where none is named.
       one_run: what acts in one run alone, where that explains more (the verdict is unknown then),
         or as much (it is ambiguous).
+      tipped: runs in which the chair of the model tips, and no channel shows that the real one did.
       probability: of every hypothesis; a pair is "a+b". more_missing: whether the effects leave
         something that is no noise. material: the largest missing force, and what matters.
       process: drive, side, yaw, wheel_turn, caster_turn -> standard deviation of what shakes the
@@ -383,6 +384,7 @@ class Diagnosis:
     drivers: list[MissingForce] = field(default_factory=list)
     nearest: Nearest | None = None
     one_run: OneRun | None = None
+    tipped: list[str] = field(default_factory=list)
     probability: dict[str, float] = field(default_factory=dict)
     more_missing: bool = False
     material: Material | None = None
@@ -405,6 +407,7 @@ class Diagnosis:
             "candidates": [c.to_dict() for c in self.candidates],
             "gap": asdict(self.gap) if self.gap else {},
             "one_run": self.one_run.to_dict() if self.one_run else None,
+            "tipped": self.tipped,
             "where": [{**asdict(w), "window": list(w.window)} for w in self.where],
             "next_experiment": self.next_experiment,
             "probability": {name: round(p, 4) for name, p in self.probability.items()},

@@ -54,6 +54,12 @@ def missing(diagnosis: Diagnosis) -> str:
         return remainder_words(diagnosis) + _undecided(diagnosis)
     if diagnosis.one_run is not None:
         return one_run_words(diagnosis.one_run)
+    if diagnosis.tipped:
+        return (
+            f"In {' and '.join(diagnosis.tipped)} the chair of the model tips, and no channel "
+            "shows that the real one did: what keeps it down is in no model, such as a person who "
+            "leans forward."
+        )
     return "A force is missing that no effect of the library explains, so none is named."
 
 

@@ -205,6 +205,14 @@ def letting_in(run: str, left: float, others: float) -> str:
     )
 
 
+def keeping_down() -> str:
+    """What to measure where the chair of the model tips and the real one did not."""
+    return (
+        "Measure how the person leans as they push (docs/rider.md), or see whether [chair] has the "
+        "rear axle and the centre of mass where they are; then diagnose again."
+    )
+
+
 def leaving_out(run: str) -> str:
     """What to do where one run differs from the others, by its name."""
     return (
