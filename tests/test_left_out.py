@@ -185,7 +185,7 @@ def test_a_held_out_run_that_alone_shows_what_is_missing_is_told(monkeypatch):
     simulator = SimpleNamespace(
         windows=[SimpleNamespace(run=k) for k in (0, 0, 1)], study=SimpleNamespace(runs=runs)
     )
-    base = SimpleNamespace(bench=SimpleNamespace(simulator=simulator))
+    base = SimpleNamespace(bench=SimpleNamespace(simulator=simulator, tipped={}))
     cells = [SimpleNamespace(total=40.0, total_dof=10.0)] * 3
     fitted = SimpleNamespace(system=SimpleNamespace(cells=cells))
     for left, said in ((7.0, ("turn", 7.0, 2.0)), (5.0, None)):

@@ -14,7 +14,7 @@ from mjchair.diagnosis import notes
 from mjchair.diagnosis.data.roughly_known import Nuisance
 from mjchair.diagnosis.explain.column_ids import Driver, Quantity
 from mjchair.diagnosis.explain.missing_force import Products, mean_forces
-from mjchair.diagnosis.fit.variant import Variant
+from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.replay.pulses import Force, Pulse
 from mjchair.diagnosis.result import (
     Candidate,
@@ -36,6 +36,7 @@ from mjchair.diagnosis.result import (
 )
 from mjchair.diagnosis.rules import Verdict
 from mjchair.effects.effect import SensorError
+from mjchair.effects.library import find
 from mjchair.report import diagnosis_words as words
 from mjchair.report.diagnosis_figures import (
     candidates,
@@ -214,7 +215,9 @@ def test_noise_that_is_larger_than_the_study_says_is_told(monkeypatch):
     of = {"a": 0.0046, "b": 0.004, "c": 0.2}
     noise = {c: SimpleNamespace(total=v, source="study.toml") for c, v in of.items()}
     study = SimpleNamespace(notes=[], unplaced=(), copied=(), noise={"a": 0.0005, "b": 0.0041})
-    bench = SimpleNamespace(simulator=SimpleNamespace(study=study), noise=noise, tipped={})
+    bench = SimpleNamespace(
+        simulator=SimpleNamespace(study=study), noise=noise, tipped={}, process=None
+    )
     gains = [
         Nuisance(f"scale:{c}", 0.01, "1", None, c, SensorError.SCALE) for c in ("fine", "faulty")
     ]
@@ -641,3 +644,28 @@ def test_a_model_that_tips_where_nothing_shows_it_is_said_first():
     tips = dataclasses.replace(diagnosis(Verdict.UNKNOWN), tipped=["sprint"])
     assert words.missing(tips).startswith("In sprint the chair of the model tips, ")
     assert tips.to_dict()["tipped"] == ["sprint"]
+
+
+def test_a_size_at_the_end_of_what_is_believed_is_told():
+    effect = find("payload")
+    ended, inside = (
+        list(notes._on_bounds(Term(effect, {"mass": mass, "height": 0.6}, ("mass", "height"))))
+        for mass in (-30.0, 25.0)
+    )
+    assert ended == [
+        "payload: mass ends at -30 kg, the end of what is believed of it; something else may act "
+        "like it"
+    ]
+    assert inside == []
+
+
+def test_it_is_told_where_a_chair_is_shaken_as_much_as_is_believed(monkeypatch):
+    shares = {"drive": 0.99, "yaw": 0.5, "side": 1.2}
+    monkeypatch.setattr(notes.noise_shown, "shares", lambda _: shares)
+    side = {notes.process.Part.SIDE: 3.0}  # as the study says
+    monkeypatch.setattr(notes.noise_levels, "known_parts", lambda _: side)
+    levels = {part: np.array([2.0]) for part in notes.process.Part}
+    simulator = SimpleNamespace(study=None)
+    bench = SimpleNamespace(process=SimpleNamespace(levels=levels), simulator=simulator)
+    (line,) = notes._as_loud_as_believed(bench)
+    assert line.startswith("what shakes the chair (drive) stands at 2.8 N, the most")

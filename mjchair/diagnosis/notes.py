@@ -9,26 +9,27 @@ import math
 from collections.abc import Iterator
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import event
+from mjchair.diagnosis.explain import event, noise_shown
 from mjchair.diagnosis.explain.choice import Choice
 from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.one_run import InOneRun
 from mjchair.diagnosis.explain.run_by_run import Uneven
 from mjchair.diagnosis.explain.screening import Base
-from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit import bounded, noise_levels, process
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ParameterId
-from mjchair.diagnosis.fit.nonlinear import Fitted
+from mjchair.diagnosis.fit.nonlinear import Fitted, on_bound
 from mjchair.diagnosis.fit.variant import Term
 from mjchair.diagnosis.result import MissingForce
 from mjchair.diagnosis.rules import Verdict
 from mjchair.effects.effect import SensorError
 from mjchair.effects.left_and_right import DIFFERENCE, SIDES
-from mjchair.units import per_cent
+from mjchair.units import per_cent, with_unit
 
 FAR_GAIN = 2.0  # standard deviations of a sensor's gain, from which it is told
 NEAR = 1.5  # times the noise that was given: of what is nearer nothing is said
+NEARLY = 0.98  # of the most that may shake a chair, from which a word is said
 TOP = 3  # drivers of a missing force that are worth a word
 
 
@@ -78,6 +79,8 @@ def notes_on(
         terms = choice.fitted.variant.terms
         said_of = [(term.effect.name, remark(choice.fitted, term)) for term in terms]
         notes += [f"{name}: {line}" for name, line in said_of if line]
+        notes += [line for term in terms for line in _on_bounds(term)]
+    notes += _as_loud_as_believed(base.bench)
     if alone is not None:
         notes.append(of_one_run(alone, choice))
     if said != Verdict.UNKNOWN or alone is not None:
@@ -94,6 +97,32 @@ def notes_on(
             "body, and what of the rider moves, and how heavy it is, these channels do not tell"
         )
     return notes
+
+
+def _on_bounds(term: Term) -> Iterator[str]:
+    """The sizes of an effect that ended on the bounds of what is believed."""
+    for key in on_bound(term):
+        p = term.effect.parameter(key.parameter)
+        value = with_unit(term.values[p.name], p.unit)
+        yield (
+            f"{term.effect.name}: {p.name} ends at {value}, the end of what is believed of it; "
+            "something else may act like it"
+        )
+
+
+def _as_loud_as_believed(bench: Bench) -> Iterator[str]:
+    """What shakes the chair as much as is believed of it: more may hide there."""
+    if bench.process is None:
+        return
+    given = noise_levels.known_parts(bench.simulator.study)
+    for name, share in noise_shown.shares(bench).items():
+        if share > NEARLY and process.NAMED[name][0][0] not in given:
+            level = f"{process.level(bench.process.levels, name):.2g}"
+            yield (
+                f"what shakes the chair ({name.replace('_', ' ')}) stands at "
+                f"{with_unit(level, process.NAMED[name][1])}, the most that is believed of it: a "
+                "steady force may hide there ([noise] in study.toml sets it)"
+            )
 
 
 def _of_tipping(bench: Bench) -> Iterator[str]:

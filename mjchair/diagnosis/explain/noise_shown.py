@@ -91,10 +91,14 @@ def left_by(
 
 def loudness(bench: Bench) -> float:
     """Power of what shakes the chair, over the most that is believed of it; its loudest force."""
+    return max(shares(bench).values()) ** 2
+
+
+def shares(bench: Bench) -> dict[str, float]:
+    """Level of each thing that shakes the chair, over the most that is believed of it."""
     assert bench.process is not None
     most, levels = _most(bench.simulator), bench.process.levels
-    of_most = [process.level(levels, n) / float(most[NAMED[n][0][0]].max()) for n in SHAKING]
-    return max(of_most) ** 2
+    return {n: process.level(levels, n) / float(most[NAMED[n][0][0]].max()) for n in SHAKING}
 
 
 def hushed(bench: Bench) -> Bench:
