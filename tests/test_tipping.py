@@ -3,9 +3,11 @@
 import math
 from types import SimpleNamespace
 
+import mujoco
 import numpy as np
 import pytest
 
+import mjchair
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.replay import tipping
 
@@ -20,7 +22,8 @@ def simulator(*channels):
     """A study of one run in two windows."""
     run = SimpleNamespace(trial=SimpleNamespace(channels=dict.fromkeys(channels)))
     study = SimpleNamespace(runs=[run], fitted=(0,))
-    return SimpleNamespace(study=study, windows=[SimpleNamespace(run=0)] * 2)
+    windows = [SimpleNamespace(run=0)] * 2
+    return SimpleNamespace(study=study, windows=windows, base=mjchair.load_spec().compile())
 
 
 def track(*leans):
@@ -51,6 +54,17 @@ def test_where_all_tip_all_are_fitted_to():
 
 def test_a_gyroscope_that_shows_the_lean_tells_what_it_was():
     assert tipping.tipped(simulator("imu_gyro.y"), track(0.1, 0.1)) == {}
+
+
+@pytest.mark.parametrize(("solid", "tips"), [(0, True), (1, False)])
+def test_a_chair_that_rolls_over_something_leans_and_does_not_tip(solid, tips):
+    spec = mjchair.load_spec()
+    size = [0.5, 1.0, 0.02]
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX, size=size, contype=solid, conaffinity=solid
+    )
+    over = SimpleNamespace(**{**vars(simulator()), "base": spec.compile()})
+    assert bool(tipping.tipped(over, track(0.1, 0.0))) == tips
 
 
 def test_strokes_do_not_count_as_tipping():

@@ -5,13 +5,15 @@ In: the windows' states as a first pass fits them. Out: the largest lean in each
 Under a hard push a chair whose rider sits still lifts its casters and falls back on them or on its
 anti-tippers; a person leans forward, and it does not. From such a motion no small change leads to
 the measured one: linear algebra around it asked for 30 kg less on a basketball chair, and what it
-left passed for noise.
+left passed for noise. A chair leans as well where it rolls over something, so that only one on a
+plane is said to tip.
 """
 
 from __future__ import annotations
 
 import math
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,6 +26,8 @@ PITCH = "imu_gyro.y"  # a channel that shows a chair tip
 
 def tipped(simulator: WindowSimulator, track: Track) -> dict[int, float]:
     """The largest lean (rad) from where a window begins, of every window that tips unseen."""
+    if not is_plane(simulator.base):
+        return {}
     runs = simulator.study.runs
     leans = {
         i: largest_lean(track.trace[i]["qpos"][:, 3:7])
@@ -31,6 +35,13 @@ def tipped(simulator: WindowSimulator, track: Track) -> dict[int, float]:
         if PITCH not in runs[w.run].trial.channels
     }
     return {i: lean for i, lean in leans.items() if lean > TIPS}
+
+
+def is_plane(model: mujoco.MjModel) -> bool:
+    """Whether all that wheels may touch in the world is planes: no kerb, no uneven floor."""
+    fixed = model.geom_bodyid == 0
+    solid = (model.geom_contype | model.geom_conaffinity) != 0
+    return bool((model.geom_type[fixed & solid] == mujoco.mjtGeom.mjGEOM_PLANE).all())
 
 
 def largest_lean(quaternion: NDArray[np.float64]) -> float:
