@@ -13,6 +13,7 @@ from mjchair.diagnosis.explain import left_out
 from mjchair.diagnosis.explain.left_out import held_out
 from mjchair.diagnosis.explain.screening import prepare, screen_columns
 from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import RoughlyKnown
 from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.next_experiment import wording
@@ -185,7 +186,7 @@ def test_a_held_out_run_that_alone_shows_what_is_missing_is_told(monkeypatch):
     simulator = SimpleNamespace(
         windows=[SimpleNamespace(run=k) for k in (0, 0, 1)], study=SimpleNamespace(runs=runs)
     )
-    base = SimpleNamespace(bench=SimpleNamespace(simulator=simulator, tipped={}))
+    base = SimpleNamespace(bench=Bench(simulator, {}, ()))
     cells = [SimpleNamespace(total=40.0, total_dof=10.0)] * 3
     fitted = SimpleNamespace(system=SimpleNamespace(cells=cells))
     for left, said in ((7.0, ("turn", 7.0, 2.0)), (5.0, None)):

@@ -11,11 +11,14 @@ import mjchair
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.replay import tipping
 
+CHAIR = mjchair.load_spec().compile()
+
 
 def turned(axis, angles):
-    """Quaternions (n, 4) of turns by angles (n,) rad about an axis."""
+    """Places (n, 7) of a chair that is turned by angles (n,) rad about an axis."""
     half = 0.5 * np.asarray(angles)
-    return np.column_stack([np.cos(half), np.sin(half)[:, None] * np.asarray(axis)])
+    quaternion = np.column_stack([np.cos(half), np.sin(half)[:, None] * np.asarray(axis)])
+    return np.hstack([np.zeros((half.size, 3)), quaternion])
 
 
 def simulator(*channels):
@@ -23,23 +26,23 @@ def simulator(*channels):
     run = SimpleNamespace(trial=SimpleNamespace(channels=dict.fromkeys(channels)))
     study = SimpleNamespace(runs=[run], fitted=(0,))
     windows = [SimpleNamespace(run=0)] * 2
-    return SimpleNamespace(study=study, windows=windows, base=mjchair.load_spec().compile())
+    return SimpleNamespace(study=study, windows=windows, base=CHAIR)
 
 
 def track(*leans):
     """A track of windows with a chair that leans back by so much (rad) and comes down again."""
     traces = [turned([0.0, 1.0, 0.0], [0.0, -lean, 0.0]) for lean in leans]
-    return SimpleNamespace(trace=[{"qpos": np.hstack([np.zeros((3, 3)), q])} for q in traces])
+    return SimpleNamespace(trace=[{"qpos": qpos} for qpos in traces])
 
 
 @pytest.mark.parametrize("axis", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.6, 0.8, 0.0]])
 def test_the_lean_is_the_angle_about_any_level_axis(axis):
-    found = tipping.largest_lean(turned(axis, [0.1, 0.05, -0.2]))
+    found = tipping.largest_lean(CHAIR, turned(axis, [0.1, 0.05, -0.2]))
     assert found == pytest.approx(0.3, abs=1e-9)
 
 
 def test_a_chair_that_turns_on_the_floor_does_not_lean():
-    assert tipping.largest_lean(turned([0.0, 0.0, 1.0], [0.0, 1.0, 3.0])) < 1e-7
+    assert tipping.largest_lean(CHAIR, turned([0.0, 0.0, 1.0], [0.0, 1.0, 3.0])) < 1e-7
 
 
 def test_a_window_that_tips_is_no_window_to_fit_to():

@@ -78,11 +78,16 @@ def floor_normal(model: mujoco.MjModel) -> Array:
 
 def lean(model: mujoco.MjModel, joint: int, qpos: Array, normal: Array) -> Array:
     """Angle (n,), rad, between a chair's z and the normal, at positions (n, nq)."""
+    return np.arccos(np.clip(upward(model, joint, qpos) @ normal, -1.0, 1.0))
+
+
+def upward(model: mujoco.MjModel, joint: int, qpos: Array) -> Array:
+    """A chair's z (n, 3) in the world, at positions (n, nq)."""
     at = int(model.jnt_qposadr[joint]) + 3
     w, x, y, z = (qpos[:, at + i] for i in range(4))
     up = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), w * w - x * x - y * y + z * z], axis=1)
     size = np.maximum(w * w + x * x + y * y + z * z, 1e-12)
-    return np.arccos(np.clip(up @ normal / size, -1.0, 1.0))
+    return np.asarray(up / size[:, None])
 
 
 def groups(wheel_names: Iterable[str]) -> dict[str, list[str]]:

@@ -25,6 +25,7 @@ LEFT_OVER = 0.4
 SPUN = 1.0  # rad/s rms by the wheels, which no gyroscope overlooks
 UNSEEN = 0.2  # of that turn, which another channel sees at most where a wheel's sign is wrong
 SWAPPED = 0.8  # cosine of a turning moment with what turns the chair, beyond which it is believed
+FEW = 8  # samples, of which less tells no course
 PUSHED = 0.3  # m/s, that a chair gains at PULLED or more only if something drives it, or downhill
 PULLED = 0.3  # m/s^2, as a slope of 3 %
 TOLD = 0.3  # of a torque, in rms, that must go with speed and its gain (0.34 of one in strokes)
@@ -150,7 +151,7 @@ def _moment_shares(inputs: Inputs, story: Story) -> Array:
     that a centre of mass aside turns the chair as much when both wheels drive alike.
     """
     grid, rate = story.time, story.values
-    if grid.size < 8 or np.sqrt(np.mean(rate**2)) < YAW:
+    if grid.size < FEW or np.sqrt(np.mean(rate**2)) < YAW:
         return np.zeros(2)
     left, right = (_torque_at(inputs, side, grid) for side in SIDES)
     moment = right - left
@@ -162,30 +163,30 @@ def _moment_shares(inputs: Inputs, story: Story) -> Array:
     return np.asarray(shares if told else np.zeros(2))
 
 
-def gained_undriven(trial: Trial, axle: RearAxle) -> tuple[str, float] | None:
-    """A channel that shows a chair gain speed, and how much (m/s), where no torque is given.
+def gains_undriven(trial: Trial, axle: RearAxle) -> bool:
+    """Whether a channel shows a chair gain speed at PULLED or more, where no torque is given.
 
     Something else drives it then: somebody who pushes it, a slope, or a wind.
     """
-    if trial.inputs is not None:
-        return None
-    for name, story in forward(trial, axle).items():
-        if story.time.size < 8:
-            continue
-        gains = np.gradient(story.values, story.time) > PULLED
-        gained = float(np.sum(np.diff(story.values)[gains[1:]]))
-        if gained > PUSHED:
-            return name, gained
-    return None
+    return trial.inputs is None and any(map(_gains_fast, _speeds(trial, axle).values()))
+
+
+def _gains_fast(story: Story) -> bool:
+    """Whether a speed grows by more than PUSHED at PULLED or more."""
+    gains = np.gradient(story.values, story.time) > PULLED
+    return float(np.sum(np.diff(story.values)[gains[1:]])) > PUSHED
+
+
+def _speeds(trial: Trial, axle: RearAxle) -> dict[str, Story]:
+    """Channel -> the speed forward (m/s) that it tells; of those that tell more than a moment."""
+    return {n: s for n, s in forward(trial, axle).items() if s.time.size >= FEW}
 
 
 def _backward(trial: Trial, axle: RearAxle) -> list[str]:
     """A note where a chair only rolls backward: each of its signs may be turned."""
-    for name, story in forward(trial, axle).items():
-        if story.time.size < 8 or story.values.max() > FORWARD:
-            continue
+    for name, story in _speeds(trial, axle).items():
         back = -float(np.trapezoid(story.values, story.time))
-        if back > BACK:
+        if story.values.max() <= FORWARD and back > BACK:
             return [
                 f"{trial.name}: by {name} the chair rolls backward all along, by {back:.2g} m; if "
                 "it went forward, turn the signs of its wheels and of its torques"
@@ -197,9 +198,7 @@ def _gains(trial: Trial, axle: RearAxle) -> list[str]:
     """A note where a chair gains speed that no torque gives it."""
     if trial.inputs is not None and not _is_still(trial.inputs):
         return []
-    for name, story in forward(trial, axle).items():
-        if story.time.size < 8:
-            continue
+    for name, story in _speeds(trial, axle).items():
         speed = np.abs(story.values)
         gained = float(np.max(speed - np.minimum.accumulate(speed)))
         if gained > PUSHED:
@@ -224,10 +223,10 @@ def _torque(trial: Trial, inputs: Inputs, axle: RearAxle, mass: float) -> list[s
       MjchairError: it gains speed besides while they brake, which no slope explains.
     """
     taken = lost = 0.0
-    seen, pulls = forward(trial, axle), []
+    seen, pulls = _speeds(trial, axle), []
     for side in SIDES:
         speeds = (seen.get(f"{side}_wheel_{kind}") for kind in ("speed", "angle"))
-        story = next((s for s in speeds if s is not None and s.time.size >= 8), None)
+        story = next((s for s in speeds if s is not None), None)
         if story is None or f"{side}_wheel" not in inputs.controls:
             continue
         torque = _torque_at(inputs, side, story.time)

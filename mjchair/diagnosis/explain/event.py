@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mjchair.diagnosis.data.sign_checks import gained_undriven
+from mjchair.diagnosis.data.sign_checks import gains_undriven
 from mjchair.diagnosis.explain.column_ids import ForceColumn, Quantity
 from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.replay.simulator import WindowSimulator
@@ -57,7 +57,7 @@ def pushed(simulator: WindowSimulator) -> set[str]:
     """Names of the runs that gain speed though no torque is given."""
     axle = rear_axle(simulator.base)
     trials = [run.trial for run in simulator.study.runs]
-    return {trial.name for trial in trials if gained_undriven(trial, axle) is not None}
+    return {trial.name for trial in trials if gains_undriven(trial, axle)}
 
 
 def _gain(base: Base, run: dict[int, list[ForceColumn]], span: tuple[int, int]) -> float:

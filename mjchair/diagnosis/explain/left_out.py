@@ -6,7 +6,7 @@ out, in chi2.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -129,7 +129,7 @@ def lone_run(base: Base, fitted: Fitted) -> Lone | None:
     """The held-out run that disagrees far more than every run of the fit; None: there is none."""
     held, others = [], 0.0
     for k, run in enumerate(base.bench.simulator.study.runs):
-        mine = _windows_of(base, {k})
+        mine = base.bench.windows_of({k})
         if not mine.size:
             continue
         if run.hold_out:
@@ -214,14 +214,7 @@ def over_noise(chi2: float, dof: float) -> float:
 def held_windows(base: Base) -> NDArray[np.int64]:
     """The windows of the trials that are held out of every fit."""
     runs = base.bench.simulator.study.runs
-    return _windows_of(base, {i for i, r in enumerate(runs) if r.hold_out})
-
-
-def _windows_of(base: Base, runs: Collection[int]) -> NDArray[np.int64]:
-    """The windows of some runs."""
-    bench = base.bench
-    every = [i for i, w in enumerate(bench.simulator.windows) if w.run in runs]
-    return np.array([i for i in every if i not in bench.tipped] or every, int)
+    return base.bench.windows_of({i for i, r in enumerate(runs) if r.hold_out})
 
 
 def plain_gap(base: Base) -> Gap:

@@ -49,10 +49,13 @@ class Bench:
 
     @cached_property
     def windows(self) -> NDArray[np.int64]:
-        """Indices of the windows that may be fitted to: those that tip only where all do."""
-        fitted = set(self.simulator.study.fitted)
-        every = [i for i, w in enumerate(self.simulator.windows) if w.run in fitted]
-        return np.array([i for i in every if i not in self.tipped] or every)
+        """Indices of the windows that may be fitted to."""
+        return self.windows_of(self.simulator.study.fitted)
+
+    def windows_of(self, runs: Collection[int]) -> NDArray[np.int64]:
+        """Indices of the windows of some runs: those that tip only where all do."""
+        every = [i for i, w in enumerate(self.simulator.windows) if w.run in runs]
+        return np.array([i for i in every if i not in self.tipped] or every, int)
 
     def shaken(self, track: Track) -> Column:
         """What shakes the chair of a track, as every channel would show it by what others tell.

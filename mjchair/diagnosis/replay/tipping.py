@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.diagnosis.replay.window_states import Track
+from mjchair.simulation import standing
 
 TIPS = math.radians(3.0)  # casters 20 mm off the floor; strokes of up to 20 N m make 0.4 degrees
 PITCH = "imu_gyro.y"  # a channel that shows a chair tip
@@ -30,7 +31,7 @@ def tipped(simulator: WindowSimulator, track: Track) -> dict[int, float]:
         return {}
     runs = simulator.study.runs
     leans = {
-        i: largest_lean(track.trace[i]["qpos"][:, 3:7])
+        i: largest_lean(simulator.base, track.trace[i]["qpos"])
         for i, w in enumerate(simulator.windows)
         if PITCH not in runs[w.run].trial.channels
     }
@@ -44,12 +45,8 @@ def is_plane(model: mujoco.MjModel) -> bool:
     return bool((model.geom_type[fixed & solid] == mujoco.mjtGeom.mjGEOM_PLANE).all())
 
 
-def largest_lean(quaternion: NDArray[np.float64]) -> float:
-    """Largest angle (rad) between the upward axis of a body at first and later.
-
-    Args:
-      quaternion: (n, 4) of the body, w first, as MuJoCo has it.
-    """
-    w, x, y, z = quaternion.T
-    up = np.stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
-    return float(np.arccos(np.clip(up[:, 0] @ up, -1.0, 1.0)).max())
+def largest_lean(model: mujoco.MjModel, qpos: NDArray[np.float64]) -> float:
+    """Largest angle (rad) between the chair's z at first and later, at positions (n, nq)."""
+    (joint, *_) = standing.chair_joints(model)
+    first = standing.upward(model, joint, qpos[:1])[0]
+    return float(standing.lean(model, joint, qpos, first).max())
