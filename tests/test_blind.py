@@ -51,3 +51,15 @@ def test_what_is_named_is_what_was_hidden(lines):
     seen = [line for line in ones if clear(line) and returned(line)]
     assert len(seen) >= 3
     assert all(kept(line) for line in seen)
+
+
+def test_a_pair_is_told_apart_where_nothing_else_that_was_fitted_is_as_near():
+    from table import decided
+
+    answer = {"kind": "two", "hidden": {"toe": {}, "wind": {}}, "channel": "",
+              "reached": {"toe": 40.0, "wind": 30.0}}  # fmt: skip
+    near = {"toe+wind": 1.0, "floor_slope+toe": 6.0, "floor_slope+toe+wind": -4.0}
+    far = near | {"floor_slope+toe": 11.0}
+    assert not decided({"answer": answer, "fits": near})
+    assert decided({"answer": answer, "fits": far})
+    assert decided({"answer": answer, "fits": {"floor_slope+toe": 0.0}}), "what was not tried"

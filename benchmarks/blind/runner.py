@@ -37,7 +37,21 @@ def diagnosed(study: Path, threads: int) -> tuple[Diagnosis | None, dict]:
                 "gap": {}, "notes": [traceback.format_exc()]}  # fmt: skip
     kept = {k: said.get(k) for k in KEPT}
     kept["candidates"] = [{k: c.get(k) for k in SCREENED} for c in said["candidates"]]
+    kept["fits"] = fits(found)
     return found, {"seconds": time.perf_counter() - began, **kept}
+
+
+def fits(found: Diagnosis | None) -> dict[str, float]:
+    """Name of every hypothesis that was fitted -> its chi2 over that of the chosen one."""
+    choice = found.stages.choice if found is not None else None
+    if choice is None:
+        return {}
+    least = {choice.hypothesis.name: 0.0}
+    for tried in choice.tried:
+        behind = tried.fitted.total - choice.fitted.total
+        name = tried.hypothesis.name
+        least[name] = min(behind, least.get(name, behind))
+    return least
 
 
 def parser(description: str | None, seed: int, count: int, work: str) -> argparse.ArgumentParser:
