@@ -334,7 +334,9 @@ def test_what_is_named_beside_more_that_is_missing_is_no_last_word():
     found.gap = dataclasses.replace(found.gap, scope="held-out trials")
     falls = "of the gap in the runs of the fit (from 3.0 to 0.9 times the noise in those held out)"
     assert f"{falls}, and a remainder is left. " in words.missing(found)
-    found.gap = dataclasses.replace(found.gap, scope="")
+    found.gap = dataclasses.replace(found.gap, after=2.95)
+    assert "of the fit (those held out stay at 3.0 times the noise), and" in words.missing(found)
+    found.gap = dataclasses.replace(found.gap, scope="", after=0.9)
     found.correction = Variant((), {"mass": -3.0, "centre_x": 2.0})
     said = "gap only with the mass of chair and person together as far from the chair of the study "
     assert said + "as is believed. The model" in words.missing(found)
@@ -358,7 +360,10 @@ def test_how_probable_a_lone_effect_is_stands_in_the_first_sentence():
 def test_rivals_are_in_the_first_sentence():
     sets = [["floor_slope", "rolling_resistance"]]
     said = words.missing(Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets))
-    assert "**floor slope** or **rolling resistance**" in said
+    assert said == (
+        "What is missing is **floor slope** or **rolling resistance**, and these runs cannot tell "
+        "which. The corrected chair has **rolling resistance** (coefficient 0.01460 ± 0.00040)."
+    )
 
 
 def test_a_correction_that_is_less_probable_than_a_rival_says_why():
@@ -366,10 +371,11 @@ def test_a_correction_that_is_less_probable_than_a_rival_says_why():
     found = Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets)
     found.probability = {"toe": 0.41, "rolling_resistance": 0.16, "rolling_resistance+wind": 0.02}
     said = words.missing(found)
-    assert "with which it fits best; toe is more probable (41 % against 18 %)" in said
+    assert said.endswith("), with which it fits best, though toe is more probable.")
+    assert "Toe is more probable (41 % against 18 %) though it" in words.choice_words(found)
     found.probability["sensor_bias:heading+wind"] = 0.5
     said = words.missing(found)
-    assert "best; sensor bias of heading and wind are more probable (50 % against 18 %)" in said
+    assert said.endswith(", though sensor bias of heading and wind are more probable.")
     del found.probability["sensor_bias:heading+wind"]
     found.probability = {"rolling_resistance": 0.41, "toe": 0.18, "outside": 0.1}
     assert "more probable" not in words.missing(found)
@@ -380,11 +386,33 @@ def test_a_correction_that_is_less_probable_than_a_rival_says_why():
 def test_alternatives_that_go_together_are_said_to():
     sets = [["rolling_resistance", "toe+air_drag", "none"]]
     found = Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets)
-    assert "**rolling resistance** or **toe** with **air drag** or nothing" in words.missing(found)
-    assert words.settled(dataclasses.replace(found, probability={"rolling_resistance": 1.0})) == []
-    found.alternatives = [["toe", "none"], ["toe+air_drag", "wind"]]
     said = words.missing(found)
-    assert "**toe** or nothing; or **wind** in the place of **toe** with **air drag**, wh" in said
+    assert "is **rolling resistance**, **toe** with **air drag** or nothing, and these" in said
+    assert words.settled(dataclasses.replace(found, probability={"rolling_resistance": 1.0})) == []
+
+
+def test_several_effects_that_have_rivals_are_each_told_from_theirs():
+    """The first sentence was a chain of effects that nobody could take apart."""
+    found = Diagnosis(
+        verdict=Verdict.AMBIGUOUS,
+        effects=[ROLLING, BIAS],
+        alternatives=[
+            ["rolling_resistance+sensor_bias", "wind"],
+            ["rolling_resistance", "toe"],
+            ["sensor_bias", "none"],
+            ["rolling_resistance", "toe", "event"],
+        ],
+    )
+    chair, cannot = words.missing(found).split(". But these runs cannot tell ")
+    assert (
+        chair.startswith("The corrected chair has **rolling resistance** (")
+        and BIAS.channel in chair
+    )
+    assert cannot == (
+        "**rolling resistance** from **toe** or something that happened once; nor **sensor bias** "
+        "from nothing; nor **rolling resistance** with **sensor bias** from **wind**."
+    )
+    assert words.alike_words(found) == f"These data cannot tell {cannot}"
 
 
 def test_what_is_in_every_explanation_is_said_before_what_is_open():
@@ -398,9 +426,9 @@ def test_what_is_in_every_explanation_is_said_before_what_is_open():
     assert words.settled(found) == [BIAS]
     said = words.missing(found)
     assert said.startswith("The sensor of imu_gyro.z shows 0.1")
-    assert "Besides, what is missing is **rolling resistance** or **toe**, which these" in said
+    assert ". Besides, what is missing is **rolling resistance** or **toe**, and these" in said
     assert said.endswith(
-        "the correction has **rolling resistance** (coefficient 0.01460 ± 0.00040)."
+        "The corrected chair has **rolling resistance** (coefficient 0.01460 ± 0.00040)."
     )
     thin = dataclasses.replace(found, effects=[BIAS], alternatives=[])
     assert words.missing(thin).startswith("Probably (96 %), the sensor of imu_gyro.z shows 0.1")

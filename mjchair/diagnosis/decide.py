@@ -71,7 +71,6 @@ Array = NDArray[np.float64]
 SHOWN = 12  # windows and channels that are listed
 LEFT = 3.0  # sigmas of a missing force that is listed
 FORCES = 8  # of them
-EVENT = "event"  # something that happened once: no effect, but a rival of effects seen once
 
 
 def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
@@ -335,7 +334,7 @@ def _alternatives(choice: Choice, once: bool, alone: InOneRun | None) -> list[li
             names.append(other)
     out = list(sets.values())
     if once:
-        out.append([*(s.effect.name for s in choice.hypothesis.starts), EVENT])
+        out.append([_joined(choice.hypothesis.starts), event.EVENT])
     if alone is not None:
         out.append([_joined(choice.hypothesis.starts), ONE_RUN])
     return out

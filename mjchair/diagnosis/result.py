@@ -356,7 +356,8 @@ class Diagnosis:
     Attributes:
       verdict: what is said. effects: in the model now, most important first.
       alternatives: sets of effects that these data cannot tell apart, one set for each effect,
-        itself first; "a+b" is two that go together, and "none" that nothing stands there.
+        itself first; "a+b" is two that go together, "none" that nothing stands there, "event"
+        that something happened once, and "one_run" that something acts in one run alone.
       candidates: every effect as screened. gap: rms of the whitened residual before and after.
       where: where the disagreement is. next_experiment: what would decide.
       notes: what was assumed or noticed. drivers: what the force that is missing goes with.

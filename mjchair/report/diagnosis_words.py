@@ -7,11 +7,12 @@ is typed, for the page to show; nothing here is HTML.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from mjchair.diagnosis.explain.calibration import NONE, OUTSIDE
 from mjchair.diagnosis.explain.column_ids import Quantity
+from mjchair.diagnosis.explain.event import EVENT
 from mjchair.diagnosis.explain.probability import ONE_RUN, of_effects
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.process import Part
@@ -35,6 +36,7 @@ TURNS = {"wheel_turn": str(Part.WHEEL_TURN), "caster_turn": str(Part.CASTER_TURN
 CLEAR = 0.5  # of what shakes the chair forward: a force once a turn of this size is told
 NOTABLE = 1.5  # times the noise: where a correction leaves more, what can explain it is said
 A_GAP = 0.8  # of what a correction leaves: where no more than this is a gap, the rest is explained
+STAYS = 0.95  # of a gap on held-out runs: a correction that leaves more does not change it
 ALL = 0.995  # of a gap: more is not told as 100 %
 ERRORS = {"bias": "bias", "scale": "gain"}
 LITTLE = 0.01  # of a person's force: less is not told
@@ -74,53 +76,90 @@ def one_run_words(one: OneRun) -> str:
 
 def _undecided(diagnosis: Diagnosis) -> str:
     """What is missing whichever it is, and what these runs cannot tell apart."""
-    sets = _sets(diagnosis.alternatives)
-    likely = of_effects(diagnosis.probability, [e.key for e in diagnosis.effects])
-    if not sets and likely >= LIKELY:
-        what = found_words(diagnosis.effects)
-        return f"Probably ({share(likely)}), {what}; these runs are not enough to name it."
-    doubt = (
-        f"{sets}, which these runs cannot tell apart"
-        if sets
-        else "an effect for which the evidence is thin"
-    )
+    every = diagnosis.effects
+    likely = of_effects(diagnosis.probability, [e.key for e in every])
+    if not diagnosis.alternatives:
+        if likely >= LIKELY:
+            what = found_words(every)
+            return f"Probably ({share(likely)}), {what}; these runs are not enough to name it."
+        return f"Perhaps {found_words(every)}, but the evidence is thin."
     known = settled(diagnosis)
-    others = [e for e in diagnosis.effects if e not in known]
-    has = " and ".join(map(effect_words, others or known))
-    chosen = f"the correction has {has}{_though_less_probable(diagnosis)}"
+    others = [e for e in every if e not in known]
     if not known or not others:
-        return f"What is missing is {doubt}; {chosen}."
+        return _capital(_open(diagnosis, others or known))
     there = of_effects(diagnosis.probability, [e.key for e in known])
     surely = "" if there >= PROBABLE else f"probably ({share(there)}), "
     first = _capital(f"{surely}{found_words(known)}")
-    return f"{first}. Besides, what is missing is {doubt}; {chosen}."
+    return f"{first}. Besides, {_open(diagnosis, others)}"
 
 
-def _though_less_probable(diagnosis: Diagnosis) -> str:
+def _open(diagnosis: Diagnosis, effects: Sequence[NamedEffect]) -> str:
+    """Effects of the correction in whose place others could stand, and these, as sentences."""
+    sets = _instead(diagnosis.alternatives)
+    has = " and ".join(map(effect_words, effects))
+    chair = f"the corrected chair has {has}{_though(diagnosis)}."
+    if len(sets) > 1 or len(effects) > 1:
+        return f"{chair} But these runs cannot tell {_from(sets)}."
+    ((own, others),) = sets.items()
+    any_of = _one_of(own, *others)
+    return f"what is missing is {any_of}, and these runs cannot tell which. {_capital(chair)}"
+
+
+def _from(sets: Mapping[str, Sequence[str]]) -> str:
+    """What cannot be told from what, as a clause."""
+    return "; nor ".join(f"{together(own)} from {_one_of(*rest)}" for own, rest in sets.items())
+
+
+def _though(diagnosis: Diagnosis) -> str:
+    """That the correction has effects than which others are more probable; empty: none are."""
+    found = _more_probable(diagnosis)
+    if found is None:
+        return ""
+    return f", with which it fits best, though {_is_more_probable(found[0])}"
+
+
+def _why_less_probable(diagnosis: Diagnosis) -> str:
     """Why the correction has effects than which others are more probable; empty: none are."""
-    first, *others = explanations(diagnosis)
-    own = next((e for e in others if e.named), None)
-    if own is None or first.name in (NONE, OUTSIDE, ONE_RUN):
+    found = _more_probable(diagnosis)
+    if found is None:
         return ""
-    likely, less = (share(e.alone + e.more) for e in (first, own))
-    if likely == less:
-        return ""
-    verb = "are" if "+" in first.name else "is"
+    likely, less = (share(e.alone + e.more) for e in found)
     return (
-        f", with which it fits best; {hypothesis_words(first.name)} {verb} more probable ({likely} "
-        f"against {less}), since probability counts as well how common an effect is and how many "
-        "numbers it has"
+        f" {_capital(_is_more_probable(found[0]))} ({likely} against {less}) though it fits less "
+        "well: probability counts as well how common an effect is and how many numbers it has."
     )
 
 
-def _sets(alternatives: Sequence[Sequence[str]]) -> str:
-    """What could stand in the place of each effect, and then in that of several together."""
-    single = [s for s in alternatives if "+" not in s[0]]
-    several = [s for s in alternatives if "+" in s[0]]
-    said = ["; and ".join(" or ".join(map(together, s)) for s in single)] if single else []
-    for own, *others in several:
-        said.append(f"{' or '.join(map(together, others))} in the place of {together(own)}")
-    return "; or ".join(said)
+def _is_more_probable(explanation: Explanation) -> str:
+    """That an explanation is more probable, as a clause."""
+    verb = "are" if "+" in explanation.name else "is"
+    return f"{hypothesis_words(explanation.name)} {verb} more probable"
+
+
+def _more_probable(diagnosis: Diagnosis) -> tuple[Explanation, Explanation] | None:
+    """The explanation that is more probable than the correction, and this; None: none is."""
+    first, *others = explanations(diagnosis)
+    own = next((e for e in others if e.named), None)
+    if own is None or first.name in (NONE, OUTSIDE, ONE_RUN):
+        return None
+    if share(first.alone + first.more) == share(own.alone + own.more):
+        return None
+    return first, own
+
+
+def _instead(alternatives: Sequence[Sequence[str]]) -> dict[str, list[str]]:
+    """An effect, or several together -> what could stand in its place; single effects first."""
+    out: dict[str, list[str]] = {}
+    for own, *others in sorted(alternatives, key=lambda names: "+" in names[0]):
+        known = out.setdefault(own, [])
+        known += [n for n in others if n not in known]
+    return out
+
+
+def _one_of(*names: str) -> str:
+    """Alternatives as words: a, b or c."""
+    *others, last = map(together, names)
+    return f"{', '.join(others)} or {last}" if others else last
 
 
 def found_words(effects: Sequence[NamedEffect]) -> str:
@@ -220,6 +259,8 @@ def _held_out(diagnosis: Diagnosis) -> str:
         return ""
     if gap.before <= 1.0:
         return " in the runs of the fit (those held out show none)"
+    if gap.after > STAYS * gap.before:
+        return f" in the runs of the fit (those held out stay at {gap.after:.1f} times the noise)"
     fell = f"from {gap.before:.1f} to {gap.after:.1f} times the noise"
     return f" in the runs of the fit ({fell} in those held out)"
 
@@ -441,7 +482,7 @@ def driver_words(diagnosis: Diagnosis) -> str:
 def alike_words(diagnosis: Diagnosis) -> str:
     """Which effects these data cannot tell apart."""
     if diagnosis.alternatives:
-        return f"Not to be told apart by these data: {_sets(diagnosis.alternatives)}."
+        return f"These data cannot tell {_from(_instead(diagnosis.alternatives))}."
     if diagnosis.verdict == Verdict.NAMED:
         return "All other explanations together have a probability of 5 % at most."
     return ""
@@ -473,7 +514,8 @@ def choice_words(diagnosis: Diagnosis) -> str:
 def _open_words(diagnosis: Diagnosis) -> str:
     """Why an effect that fits is not named."""
     if diagnosis.alternatives:
-        return "It is one explanation that fits. Another of its set fits about as well."
+        about = "It is one explanation that fits. Another of its set fits about as well."
+        return about + _why_less_probable(diagnosis)
     likely = of_effects(diagnosis.probability, [e.key for e in diagnosis.effects])
     if likely < PROBABLE:
         told = min(likely, PROBABLE - 0.01)  # 94.6 % is no 95 %
@@ -587,8 +629,9 @@ def bold(name: str) -> str:
 
 def together(names: str) -> str:
     """One of the alternatives as words, bold: an effect, several that go together, or nothing."""
-    if names == ONE_RUN:
-        return "something in one run alone"
+    known = {ONE_RUN: "something in one run alone", EVENT: "something that happened once"}
+    if names in known:
+        return known[names]
     return "nothing" if names == NONE else " with ".join(map(bold, names.split("+")))
 
 

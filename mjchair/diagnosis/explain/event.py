@@ -15,6 +15,7 @@ from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.model.rolling import rear_axle
 
+EVENT = "event"  # something that happened once: no effect, but a rival of effects seen once
 LASTS = 2  # seconds that follow each other, which an event may lie across
 
 
