@@ -14,6 +14,7 @@ from mjchair.diagnosis import notes
 from mjchair.diagnosis.data.roughly_known import Nuisance
 from mjchair.diagnosis.explain.column_ids import Driver, Quantity
 from mjchair.diagnosis.explain.missing_force import Products, mean_forces
+from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.replay.pulses import Force, Pulse
 from mjchair.diagnosis.result import (
@@ -674,17 +675,20 @@ def test_a_model_that_tips_where_nothing_shows_it_is_said_first():
     assert tips.to_dict()["tipped"] == ["sprint"]
 
 
-def test_a_size_at_the_end_of_what_is_believed_is_told():
-    effect = find("payload")
-    ended, inside = (
-        list(notes._on_bounds(Term(effect, {"mass": mass, "height": 0.6}, ("mass", "height"))))
-        for mass in (-30.0, 25.0)
-    )
-    assert ended == [
-        "payload: mass ends at -30 kg, the end of what is believed of it; something else may act "
-        "like it"
-    ]
-    assert inside == []
+@pytest.mark.parametrize(
+    ("mass", "height", "std", "said"),
+    [
+        (-30.0, 0.6, 0.2, ["mass ends at -30 kg"]),
+        (25.0, 0.6, 0.2, []),
+        (25.0, 1.6, 0.2, ["height ends at 1.6 m"]),
+        (25.0, 1.6, 0.8, []),  # straight coasts hardly tell how high a load is
+    ],
+)
+def test_a_number_at_the_end_of_what_is_believed_is_told(mass, height, std, said):
+    term = Term(find("payload"), {"mass": mass, "height": height}, ("mass", "height"))
+    told = list(notes._at_ends(term, {ParameterId("payload", "height"): std}))
+    rest = ", the end of what is believed of it; something else may act like it"
+    assert told == [f"payload: {ends}{rest}" for ends in said]
 
 
 def test_it_is_told_where_a_chair_is_shaken_as_much_as_is_believed(monkeypatch):

@@ -6,7 +6,7 @@ In: the chair as it was with its gap, the choice of effects and the verdict. Out
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import event, noise_shown
@@ -19,7 +19,7 @@ from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.fit import bounded, noise_levels, process
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ParameterId
-from mjchair.diagnosis.fit.nonlinear import Fitted, on_bound
+from mjchair.diagnosis.fit.nonlinear import Fitted, at_end
 from mjchair.diagnosis.fit.variant import Term
 from mjchair.diagnosis.result import MissingForce
 from mjchair.diagnosis.rules import Verdict
@@ -79,7 +79,7 @@ def notes_on(
         terms = choice.fitted.variant.terms
         said_of = [(term.effect.name, remark(choice.fitted, term)) for term in terms]
         notes += [f"{name}: {line}" for name, line in said_of if line]
-        notes += [line for term in terms for line in _on_bounds(term)]
+        notes += [line for term in terms for line in _at_ends(term, choice.fitted.std)]
     notes += _as_loud_as_believed(base.bench)
     if alone is not None:
         notes.append(of_one_run(alone, choice))
@@ -99,10 +99,17 @@ def notes_on(
     return notes
 
 
-def _on_bounds(term: Term) -> Iterator[str]:
-    """The sizes of an effect that ended on the bounds of what is believed."""
-    for key in on_bound(term):
+def _at_ends(term: Term, std: Mapping[ParameterId, float]) -> Iterator[str]:
+    """The parameters of an effect that ended on the bounds of what is believed.
+
+    A number that says where an effect acts may lie there for want of data, without a word.
+    """
+    for key in at_end(term):
         p = term.effect.parameter(key.parameter)
+        if not p.sized and not rules.is_far(
+            (term.values[p.name] - p.neutral) / std.get(key, math.inf)
+        ):
+            continue
         value = with_unit(term.values[p.name], p.unit)
         yield (
             f"{term.effect.name}: {p.name} ends at {value}, the end of what is believed of it; "

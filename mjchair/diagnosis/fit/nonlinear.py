@@ -348,11 +348,16 @@ def _outside(bench: Bench, nuisances: Iterable[ColumnId]) -> list[ColumnId]:
 
 def on_bound(term: Term) -> list[ParameterId]:
     """The sizes of an effect that lie on a bound which is not where the effect is not there."""
+    return [key for key in at_end(term) if term.effect.parameter(key.parameter).sized]
+
+
+def at_end(term: Term) -> list[ParameterId]:
+    """The parameters of an effect that lie on a bound, but for where the effect is not there."""
     out = []
     for key, p in term.parameters:
         value, near = term.values[p.name], ON_BOUND * (p.high - p.low)
         ends = [bound for bound in (p.low, p.high) if bound != p.neutral]
-        if p.sized and any(abs(value - bound) <= near for bound in ends):
+        if any(abs(value - bound) <= near for bound in ends):
             out.append(key)
     return out
 
