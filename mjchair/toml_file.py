@@ -46,7 +46,9 @@ def read_toml(path: Path, schema: type[Schema]) -> Schema:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise MjchairError(f"cannot read {path}: {error.strerror}; give a TOML file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except UnicodeDecodeError:
+        raise MjchairError(f"{path}: not TOML: it is not UTF-8 text") from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise MjchairError(f"{path}: not TOML: {str(error).splitlines()[0]}") from None
     return checked(table, schema, str(path))
 

@@ -205,7 +205,7 @@ def test_bad_arguments_are_one_line_and_nothing_is_written(done, tmp_path, capsy
         assert not out.exists(), arguments
     with pytest.raises(SystemExit):
         cli.main(["diagnose", str(done[0]), "--out", str(out), "--threads", "-1"])
-    assert "0 for all processors" in one_line(capsys) and not out.exists()
+    assert "is no number of processors" in one_line(capsys) and not out.exists()
 
 
 # a diagnosis that sends itself a signal as soon as it has kept so many simulations

@@ -54,6 +54,7 @@ def test_a_good_study_is_read(tmp_path):
 def test_missing_things_are_named(tmp_path):
     fails(tmp_path, "no study")
     write(tmp_path, wheels())
+    fails(tmp_path / "a.csv", "no study")
     (tmp_path / "a.csv").unlink()
     fails(tmp_path, "no file")
     (tmp_path / "study.toml").write_text('model = "manual"\n')

@@ -80,3 +80,6 @@ def test_a_file_that_is_no_toml_is_one_line(tmp_path):
     with pytest.raises(MjchairError, match=r"a\.toml: not TOML: Invalid value") as error:
         read_toml(path, Whole)
     assert "\n" not in str(error.value)
+    path.write_bytes(b"\x93NUMPY")
+    with pytest.raises(MjchairError, match=r"a\.toml: not TOML: it is not UTF-8 text$"):
+        read_toml(path, Whole)

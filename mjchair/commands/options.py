@@ -163,7 +163,7 @@ def processors(text: str) -> int:
     """How many threads or processes, as the type of an option; 0: one for each processor."""
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not a whole number; give 1 or more, or 0 for all processors"
+            f"{text!r} is no number of processors; give 1 or more, or 0 for all of them"
         )
     return int(text)
 

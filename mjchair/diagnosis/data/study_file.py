@@ -139,7 +139,7 @@ def read_study(folder: str | os.PathLike[str]) -> Study:
     """
     path = Path(folder)
     path = path / FILE if path.is_dir() else path
-    if not path.is_file():
+    if not path.is_file() or path.suffix != Path(FILE).suffix:
         raise MjchairError(f"no study {path}; a study is a folder with a {FILE}")
     entry = read_toml(path, StudyEntry)
     if entry.kind == "rig":
