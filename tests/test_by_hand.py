@@ -11,20 +11,22 @@ from mjchair.diagnosis.fit.variant import Term
 from mjchair.diagnosis.next_experiment import by_hand
 from mjchair.effects.library import find
 
-MASS = next(n for n in MECHANICAL if n.name == "mass")
+MASS, STIFFNESS = (
+    next(n for n in MECHANICAL if n.name == name) for name in ("mass", "rear_stiffness")
+)
 
 
 def start(name):
     return SimpleNamespace(effect=find(name))
 
 
-def fit(name, sizes, std, mass):
-    """A fit of one effect; `mass`: by how many standard deviations it moved the mass."""
+def fit(name, sizes, std, by, number=MASS):
+    """A fit of one effect; `by`: how many standard deviations it moved a number."""
     effect = find(name)
     return SimpleNamespace(
         variant=SimpleNamespace(terms=(Term(effect, {**effect.neutral(), **sizes}, tuple(sizes)),)),
         std={ParameterId(name, key): std for key in sizes},
-        moved=[(MASS, mass)],
+        moved=[(number, by)],
     )
 
 
@@ -73,6 +75,17 @@ def test_what_is_not_clearly_there_is_not_told(said):
 def test_what_only_runs_tell_apart_has_no_other_way(said):
     drag = fit("air_drag", {"drag_area": 0.5}, 0.05, 0.0)
     assert said(DRAG, ("rolling_resistance", "air_drag", drag)) == ""
+
+
+def test_a_number_that_an_effect_moves_as_well_is_not_told_without_it(said):
+    """It was "+0.0 % if it is cornering stiffness", where the tires were 124 % stiffer."""
+    stiff = fit("cornering_stiffness", {"rear": 1.24}, 0.1, 0.0, STIFFNESS)
+    plain = fit("rolling_resistance", {"coefficient": 0.004}, 0.0004, 3.0, STIFFNESS)
+    words = said(stiff, ("cornering_stiffness", "rolling_resistance", plain))
+    assert "stiffness of the rear tires" not in words
+    toe = fit("toe", {"symmetric": 0.02}, 0.002, 0.0, STIFFNESS)
+    words = said(toe, ("toe", "rolling_resistance", plain))
+    assert "Measure the cornering stiffness of the rear tires: +0.0 %" in words
 
 
 def test_every_effect_says_it_as_an_order_or_not_at_all():

@@ -291,6 +291,7 @@ def test_what_a_correction_leaves_is_told_apart_from_what_is_only_roughly_known(
         ("sensor_scale", "scale", 0.0025, "1", "shows 0.25 % too much (**sensor scale**: scale"),
         ("sensor_bias", "bias", -0.02, "rad", "shows 0.02 rad too little (**sensor bias**: bias"),
         ("sensor_delay", "delay", 0.03, "s", "comes 0.03 s late (**sensor delay**: delay"),
+        ("sensor_delay", "delay", -0.03, "s", "comes 0.03 s early (**sensor delay**: delay"),
     ],
 )
 def test_a_sensor_at_fault_is_no_lack_of_the_chair(name, parameter, value, unit, said):

@@ -19,6 +19,9 @@ from mjchair.model import parts
 from mjchair.simulation.channels import TIRE
 
 COUNTED = 0.2  # how often a scale is wrong that counts or is calibrated, over others (assumption)
+EARLY = (
+    0.3  # s that a sensor may come early: its device was started by hand, as torque_delay has it
+)
 LARGEST = 20.0  # times the usual bias: 2 rad/s of a wheel, 4 m/s^2 (assumption)
 COMPONENTS = {".x": 0, ".y": 1, ".z": 2} | {f".{part}": k for k, (part, _) in enumerate(TIRE)}
 
@@ -60,6 +63,8 @@ def _scale(channel: str) -> Callable[..., None]:
 
 
 def _delay(channel: str) -> Callable[..., None]:
+    """The edit of a delay. A sensor that comes early stays on time: none shows what is to come."""
+
     def edit(spec: mujoco.MjSpec, delay: float) -> None:
         if delay <= 0.0:
             return
@@ -112,8 +117,8 @@ def sensor_effects(channel: str) -> tuple[Effect, ...]:
     most = max(LARGEST * typical, half_turn)
     bias = Parameter("bias", unit, typical, -most, most)
     scale = Parameter("scale", "1", 0.05, -0.9, 9.0)
-    delay = Parameter("delay", "s", 0.02, 0.0, 0.5)
-    lags = signature + "; its lag grows with the rate of change"
+    delay = Parameter("delay", "s", 0.02, -EARLY, 0.5)
+    lags = signature + "; its error grows with the rate of change"
     effects = [
         Effect(
             "sensor_bias",

@@ -180,7 +180,8 @@ def sensor_words(effect: NamedEffect) -> str:
     """What a sensor at fault shows, as a clause."""
     number = next(iter(effect.parameters.values()))
     if effect.name == "sensor_delay":
-        shows = f"comes {size(number.value)} s late"
+        late = number.value >= 0.0
+        shows = f"comes {size(abs(number.value))} s {'late' if late else 'early'}"
     else:
         much = "much" if number.value > 0.0 else "little"
         by = (

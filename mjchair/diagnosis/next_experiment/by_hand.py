@@ -55,12 +55,17 @@ def _way(fitted: Fitted, key: str) -> str:
 
 
 def _most_apart(choice: Choice) -> str:
-    """The roughly known number of which the choice and a rival say most different things."""
+    """The roughly known number of which the choice and a rival say most different things.
+
+    What an effect moves as well is no such number: the cornering stiffness that a person measures
+    has the effect in it.
+    """
     own = {n.name: by for n, by in choice.fitted.moved}
     far, said = APART, ""
     for without, instead, rival in exchanged(choice):
+        by_effect = _moved_by_effects(choice.fitted) | _moved_by_effects(rival.fitted)
         for n, by in rival.fitted.moved:
-            if n.linear or abs(by - own.get(n.name, by)) < far:
+            if n.linear or n.name in by_effect or abs(by - own.get(n.name, by)) < far:
                 continue
             far = abs(by - own[n.name])
             said = (
@@ -68,6 +73,11 @@ def _most_apart(choice: Choice) -> str:
                 f"study if it is {_names(without)}, {changed(n, by, 1)} if it is {_names(instead)}."
             )
     return said
+
+
+def _moved_by_effects(fitted: Fitted) -> set[str]:
+    """Names of what is only roughly known and a fit's effects move as well."""
+    return {name for term in fitted.variant.terms for name in term.effect.shared}
 
 
 def _names(starts: Sequence[Start]) -> str:

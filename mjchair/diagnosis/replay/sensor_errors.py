@@ -44,11 +44,14 @@ class SensorErrors:
 
 
 def delayed(time: Array, values: Array, delay: float) -> Array:
-    """Values as they were `delay` (s) earlier; extrapolated along the first slope before that."""
-    early = time - delay
-    out = np.interp(early, time, values)
-    before = early < time[0]
-    if before.any() and time.size > 3:
-        slope = (values[3] - values[0]) / (time[3] - time[0])
-        out[before] = values[0] + slope * (early[before] - time[0])
+    """Values as they were `delay` (s) earlier, or will be later where it is negative.
+
+    Before the first and after the last of them they go on along the slope there.
+    """
+    shown = time - delay
+    out = np.interp(shown, time, values)
+    if time.size > 3:
+        for end, inner, beyond in ((0, 3, shown < time[0]), (-1, -4, shown > time[-1])):
+            slope = (values[inner] - values[end]) / (time[inner] - time[end])
+            out[beyond] = values[end] + slope * (shown[beyond] - time[end])
     return np.asarray(out)
