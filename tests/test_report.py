@@ -31,6 +31,7 @@ from mjchair.diagnosis.result import (
     NamedEffect,
     Nearest,
     OneRun,
+    Shaken,
     TrialGap,
     WholeRun,
     WindowGaps,
@@ -690,6 +691,29 @@ def test_a_number_at_the_end_of_what_is_believed_is_told(mass, height, std, said
     told = list(notes._at_ends(term, {ParameterId("payload", "height"): std}))
     rest = ", the end of what is believed of it; something else may act like it"
     assert told == [f"payload: {ends}{rest}" for ends in said]
+
+
+def test_a_gap_that_roughly_known_numbers_make_is_told_where_nothing_is_missing():
+    """It was "as well as the noise allows" beside a gap of 3.16 times the noise."""
+    gap = GapSummary(before=3.16, after=None, scope="held-out trials: rms", p_value=0.9,
+                     p_value_after=None, unforeseen=1.05)  # fmt: skip
+    found = dataclasses.replace(diagnosis(Verdict.NONE), gap=gap)
+    said = words.missing(found)
+    assert "3.2 times the noise that the chair leaves on held-out runs, all but 1.1 can" in said
+    found.gap = dataclasses.replace(gap, unforeseen=3.0)
+    assert "times the noise that" not in words.missing(found)
+
+
+def test_a_run_that_is_shaken_far_harder_is_said_where_nothing_is_missing():
+    """A brake of 4 N that rubbed for 2 s in one coast was "nothing; use the chair as it is"."""
+    found = dataclasses.replace(
+        diagnosis(Verdict.NONE), next_experiment="", shaken=Shaken("first", 2.85, "second", 1.27)
+    )
+    said = words.missing(found)
+    assert said.startswith("Nothing")
+    assert "But first is shaken far harder than second, by 2.9 N against 1.3 N, which" in said
+    assert words.next_step(found) == "Look at what was different in first, and repeat it."
+    assert found.to_dict()["shaken"]["other"] == "second"
 
 
 def test_it_is_told_where_a_chair_is_shaken_as_much_as_is_believed(monkeypatch):

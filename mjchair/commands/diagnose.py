@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 
 from mjchair.commands import options
 from mjchair.errors import MjchairError, note
-from mjchair.units import probable
 
 if TYPE_CHECKING:
     from mjchair.diagnosis.data.study import Study
@@ -37,8 +36,10 @@ TOP = (
     "probability",
     "more_missing",
     "one_run",
+    "tipped",
     "material",
     "process",
+    "shaken",
     "drivers",
     "notes",
 )
@@ -71,7 +72,7 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 
 
 def run(args: argparse.Namespace) -> int:
-    """Diagnose, write everything, and print the verdict, and what to do next if anything is."""
+    """Diagnose, write everything, and print the verdict and the first sentences of the report."""
     from mjchair.diagnosis.data.study import without_estimated_torques
     from mjchair.diagnosis.data.study_file import read_study
     from mjchair.diagnosis.diagnose import diagnose
@@ -107,8 +108,8 @@ def run(args: argparse.Namespace) -> int:
             return 130
         shutil.rmtree(kept, ignore_errors=True)
     print(f"{_line(found)}; see {folder}/report.html")
-    if found.next_experiment:
-        print(f"next: {diagnosis_words.next_step(found)}")
+    for head, said in diagnosis_words.first_screen(found).items():
+        print(f"  {head}: {said.replace('**', '')}")
     return 0
 
 
@@ -190,33 +191,7 @@ def _interrupted(kept: Path) -> bool:
 def _line(found: Diagnosis) -> str:
     """Verdict, effects and gap on one line."""
     names = ", ".join(e.name for e in found.effects) or "no effect"
-    sets = " / ".join(" or ".join(group).replace("+", " with ") for group in found.alternatives)
-    gap, alone = found.gap, found.verdict == "ambiguous" and not sets
+    gap = found.gap
     assert gap is not None
-    return (
-        f"{found.verdict}: {names}"
-        + (f"; cannot be told apart: {sets}" if sets else "")
-        + ("; these runs are not enough to name it" if alone else "")
-        + ("; more is missing" if found.more_missing else "")
-        + _likely(found)
-        + f"; gap {gap.before:.2f}"
-        + (f" -> {gap.after:.2f}" if gap.after is not None else "")
-        + f" (noise {gap.noise_floor:.2f})"
-    )
-
-
-def _likely(found: Diagnosis) -> str:
-    """How probable the effects are, or that nothing is missing; empty where neither is said."""
-    from mjchair.diagnosis.explain.calibration import NONE
-    from mjchair.diagnosis.explain.probability import of_effects
-    from mjchair.diagnosis.rules import LIKELY
-
-    if found.verdict == "unknown":
-        return ""
-    if found.effects:
-        likely = of_effects(found.probability, [e.key for e in found.effects])
-        return f"; probability {probable(likely)}"
-    nothing = found.probability.get(NONE, 0.0)
-    if nothing < LIKELY:
-        return "; what is left is too small to matter"
-    return f"; probability that nothing is missing {probable(nothing)}"
+    after = "" if gap.after is None else f" -> {gap.after:.2f}"
+    return f"{found.verdict}: {names}; gap {gap.before:.2f}{after} (noise {gap.noise_floor:.2f})"

@@ -16,7 +16,7 @@ from scipy import stats
 
 from mjchair.diagnosis import notes, rules
 from mjchair.diagnosis.evidence import evidence, missing_forces
-from mjchair.diagnosis.explain import event, hypotheses, missing_force
+from mjchair.diagnosis.explain import event, hypotheses, missing_force, noise_shown
 from mjchair.diagnosis.explain.calibration import NONE
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Choice, closure
@@ -61,6 +61,7 @@ from mjchair.diagnosis.result import (
     NamedEffect,
     Nearest,
     OneRun,
+    Shaken,
     Stages,
 )
 from mjchair.diagnosis.rules import Verdict
@@ -145,6 +146,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         more_missing=bool(named and stands and rules.more_missing(stands)),
         material=size,
         process=_process(base),
+        shaken=_shaken(noise_shown.forward_levels(base.bench), size.limit),
         terms=named.fitted.variant.terms if named else (),
         correction=named.fitted.variant if named else None,
         evidence=evidence(base, named.fitted if named else None, plan, forces),
@@ -254,6 +256,20 @@ def _process(base: Base) -> dict[str, Estimate]:
         for name, (_, unit) in NAMED.items()
         if not unseen.get(name, False)
     }
+
+
+def _shaken(kinds: Sequence[Mapping[str, float]], limit: float) -> Shaken | None:
+    """The run that is shaken hardest, over another of its kind; None: none is far harder.
+
+    Args:
+      kinds: of each kind of run: run -> N. limit: N, below which no force matters.
+    """
+    found = []
+    for runs in kinds:
+        trial, other = max(runs, key=runs.__getitem__), min(runs, key=runs.__getitem__)
+        if runs[trial] > limit and rules.shakes_far_harder(runs[trial], runs[other]):
+            found.append(Shaken(trial, runs[trial], other, runs[other]))
+    return max(found, key=lambda shaken: shaken.force, default=None)
 
 
 def _plan(base: Base, choice: Choice, once: bool) -> tuple[Plan | None, list[str]]:
@@ -416,14 +432,19 @@ def _summary(base: Base, gap: Gap, choice: Choice | None, held: rules.HeldOut | 
     """The gap as it was, and as the corrected chair leaves it; without one there is no after."""
     windows = _shown_windows(base)
     before, dof = slow_part(base.plain.system, windows)
-    who = "held-out trials" if held_windows(base).size else "all trials, since none is held out"
+    is_held = bool(held_windows(base).size)
+    who = "held-out trials" if is_held else "all trials, since none is held out"
+    if choice is None:
+        unforeseen = gap_foretold(base) if is_held else None
+    else:
+        unforeseen = over_noise(held.after, held.dof) if held else None
     return GapSummary(
         before=over_noise(before, dof),
         after=over_noise(slow_part(choice.fitted.system, windows)[0], dof) if choice else None,
         scope=f"{who}: rms of the whitened residual below {BAND:g} Hz",
         p_value=gap.p,
         p_value_after=choice.after.p if choice else None,
-        unforeseen=over_noise(held.after, held.dof) if choice and held else None,
+        unforeseen=unforeseen,
     )
 
 

@@ -120,9 +120,9 @@ class GapSummary:
     """Rms of the whitened residual before and after, over the trials of `scope`; noise gives 1.
 
     `after` is what the corrected chair leaves, None where there is none. `unforeseen` is what is
-    left of it without what the fitted trials leave open of the numbers that are only roughly known;
-    None where no trial is held out. `p_value` and `p_value_after` are of all tests together, on the
-    trials that were fitted to.
+    left, by the corrected chair where there is one, without what the fitted trials leave open of
+    the numbers that are only roughly known; None where no trial is held out. `p_value` and
+    `p_value_after` are of all tests together, on the trials that were fitted to.
     """
 
     before: float
@@ -253,6 +253,20 @@ class Nearest:
     remainder: float
 
 
+@dataclass(frozen=True)
+class Shaken:
+    """Two runs of one manoeuvre, of which what shakes the chair pushes one far harder, N.
+
+    Attributes:
+      trial: the one, and how hard. other: the one that is shaken least, and how hard.
+    """
+
+    trial: str
+    force: float
+    other: str
+    least: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class OneRun:
     """Effects that explain more by acting in one run alone, or as much, as any in all runs do.
@@ -369,6 +383,7 @@ class Diagnosis:
         something that is no noise. material: the largest missing force, and what matters.
       process: drive, side, yaw, wheel_turn, caster_turn -> standard deviation of what shakes the
         chair; person -> share of a moving person's force that is in no model.
+      shaken: a run that is shaken far harder than another of its kind; None: none is.
       terms: the effects with the values that stand in the corrected chair.
       correction: the corrected chair, with what is only roughly known where the fit moved it.
       evidence: for the report. stages: for further work in Python.
@@ -390,6 +405,7 @@ class Diagnosis:
     more_missing: bool = False
     material: Material | None = None
     process: Mapping[str, Estimate] = field(default_factory=dict)
+    shaken: Shaken | None = None
     terms: tuple[Term, ...] = ()
     correction: Variant | None = field(default=None, repr=False)
     evidence: Evidence | None = field(default=None, repr=False)
@@ -415,6 +431,7 @@ class Diagnosis:
             "more_missing": self.more_missing,
             "material": self.material.to_dict() if self.material else {},
             "process": {n: {"value": e.value, "unit": e.unit} for n, e in self.process.items()},
+            "shaken": asdict(self.shaken) if self.shaken else None,
             "drivers": [d.to_dict() for d in self.drivers],
             "notes": self.notes,
         }

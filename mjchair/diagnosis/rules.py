@@ -36,6 +36,7 @@ RIVAL_CHI2 = 10.0  # a rival this near, in chi2 with its penalty, is not ruled o
 SIZE_BY_FORM = 0.01  # of an effect's size: the form of no effect tells it better (assumption)
 FORM = 0.02  # of the gain: the form of no effect is better known (assumption)
 REPLACES = 0.5  # of what an effect brings: what misses more of it does not stand in its place
+HARDER = 2.0  # times: what shakes one run so much harder than another may be no noise
 FAR_BEHIND = 3.0  # times what keeps a rival: a fit that promises no more is not followed
 RIVAL_ERRORS = 2.0  # nor one this near in paired standard errors over windows
 # how hypotheses grow and shrink
@@ -635,6 +636,18 @@ def counts(by: float, *, gain: float) -> float:
       gain: chi2 that the effect brings in whose place the other stands.
     """
     return by * RIVAL_CHI2 / not_ruled_out(gain=gain)
+
+
+def shakes_far_harder(one: float, other: float) -> bool:
+    """Whether what shakes the chair pushes it far harder in one run than in another of its kind.
+
+    The level of a run of 6 s is known to a quarter, and drawn to that of the others; a brake of
+    4 N that rubs for 2 s in one coast of two makes 3.0 N there and 1.3 N in the other.
+
+    Args:
+      one, other: N.
+    """
+    return one > HARDER * other
 
 
 def is_far(by: float) -> bool:

@@ -105,9 +105,6 @@ def page(
     words = diagnosis_words
     evidence, gaps = diagnosis.evidence, diagnosis.gap
     said = {
-        "missing": words.missing(diagnosis),
-        "sure": words.sure(diagnosis),
-        "next": words.next_step(diagnosis),
         "gap": words.gap_words(diagnosis),
         "process": words.process_words(diagnosis),
         "drivers": words.driver_words(diagnosis),
@@ -133,6 +130,7 @@ def page(
         .get_template(TEMPLATE)
         .render(
             title=title,
+            first=words.first_screen(diagnosis),
             said=said,
             tables=tables,
             notes=words.notes(diagnosis),

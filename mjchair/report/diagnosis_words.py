@@ -46,10 +46,20 @@ ALIKE = 3  # effects in one run alone that a sentence names
 UNSURE = 0.005  # probabilities below this are not named
 
 
+def first_screen(diagnosis: Diagnosis) -> dict[str, str]:
+    """What a person reads first: a heading -> what stands under it."""
+    return {
+        "What is missing": missing(diagnosis),
+        "How sure": sure(diagnosis),
+        "What to do next": next_step(diagnosis),
+    }
+
+
 def missing(diagnosis: Diagnosis) -> str:
-    """What is missing, in one sentence."""
+    """What is missing, in a sentence or a few."""
     if diagnosis.verdict == Verdict.NONE:
-        return nothing_missing(diagnosis) + turn_words(diagnosis)
+        more = (unforeseen_words, turn_words, shaken_words)
+        return nothing_missing(diagnosis) + "".join(words(diagnosis) for words in more)
     if diagnosis.verdict == Verdict.NAMED:
         return remainder_words(diagnosis) + _capital(found_words(diagnosis.effects)) + "."
     if diagnosis.verdict == Verdict.AMBIGUOUS:
@@ -238,6 +248,18 @@ def turn_words(diagnosis: Diagnosis) -> str:
     )
 
 
+def shaken_words(diagnosis: Diagnosis) -> str:
+    """That a run is shaken far harder than another of its kind; nothing where none is."""
+    shaken = diagnosis.shaken
+    if shaken is None:
+        return ""
+    return (
+        f" But {shaken.trial} is shaken far harder than {shaken.other}, by {size(shaken.force)} N "
+        f"against {size(shaken.least)} N, which counts as noise: what comes and goes, such as a "
+        "brake that rubs, may hide there."
+    )
+
+
 def remainder_words(diagnosis: Diagnosis) -> str:
     """What a name leaves, before the name; nothing where nothing is left."""
     if not diagnosis.more_missing:
@@ -399,6 +421,8 @@ def next_step(diagnosis: Diagnosis) -> str:
     """What to do next, in one sentence."""
     if not diagnosis.next_experiment:
         if diagnosis.verdict == Verdict.NONE:
+            if diagnosis.shaken is not None:
+                return f"Look at what was different in {diagnosis.shaken.trial}, and repeat it."
             return "Nothing is needed; use the chair as it is."
         if diagnosis.effects and not any(e.of_chair for e in diagnosis.effects):
             chair = "" if diagnosis.more_missing else "; the chair lacks nothing"
@@ -561,17 +585,18 @@ def runs_words(diagnosis: Diagnosis) -> str:
 
 
 def unforeseen_words(diagnosis: Diagnosis) -> str:
-    """How much of what the corrected chair leaves on held-out runs is a gap.
+    """How much of what the chair leaves on held-out runs is a gap, the corrected one if it is.
 
     Nothing where it is nearly all of it, or where little is left.
     """
     gap = diagnosis.gap
-    if gap is None or gap.after is None or gap.unforeseen is None or not diagnosis.effects:
+    if gap is None or gap.unforeseen is None or diagnosis.verdict == Verdict.UNKNOWN:
         return ""
-    if gap.after < NOTABLE or gap.unforeseen > A_GAP * gap.after:
+    left, chair = (gap.before, "chair") if gap.after is None else (gap.after, "corrected chair")
+    if left < NOTABLE or gap.unforeseen > A_GAP * left:
         return ""
     return (
-        f" Of the {size(gap.after)} times the noise that the corrected chair leaves, all but "
+        f" Of the {size(left)} times the noise that the {chair} leaves on held-out runs, all but "
         f"{size(gap.unforeseen)} can come from numbers that the study knows only roughly, and that "
         "the runs of the fit hardly show."
     )

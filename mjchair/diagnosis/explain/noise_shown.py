@@ -101,6 +101,24 @@ def shares(bench: Bench) -> dict[str, float]:
     return {n: process.level(levels, n) / float(most[NAMED[n][0][0]].max()) for n in SHAKING}
 
 
+def forward_levels(bench: Bench) -> list[dict[str, float]]:
+    """How hard what shakes the chair pushes it forward: run of the fit -> N, kind by kind.
+
+    Runs of a kind have one manoeuvre, with torques or without. None where study.toml gives the
+    level.
+    """
+    study, shaking = bench.simulator.study, bench.process
+    if shaking is None or set(NAMED["drive"][0]) & set(noise_levels.known_parts(study)):
+        return []
+    parts = np.array([shaking.levels[part] for part in NAMED["drive"][0]])
+    kinds: dict[tuple[str, bool], dict[str, float]] = {}
+    for k in study.fitted:
+        run = study.runs[k]
+        kind = kinds.setdefault((run.manoeuvre, run.trial.inputs is None), {})
+        kind[run.trial.name] = float(np.linalg.norm(parts[:, k]))
+    return list(kinds.values())
+
+
 def hushed(bench: Bench) -> Bench:
     """The bench with nearly nothing that shakes the chair, but for what study.toml gives."""
     assert bench.process is not None

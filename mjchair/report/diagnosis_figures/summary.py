@@ -73,5 +73,5 @@ def caption(diagnosis: Diagnosis) -> str:
     return (
         f"Left: the run {runs[0].trial}, {kind}, simulated in one go from its first state with the "
         "measured inputs. Right: what the windows of 2\N{NO-BREAK SPACE}s leave."
-        + unforeseen_words(diagnosis)
+        + (unforeseen_words(diagnosis) if diagnosis.effects else "")
     )
