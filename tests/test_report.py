@@ -12,6 +12,7 @@ from figure_layout import assert_legible
 
 from mjchair.diagnosis import notes
 from mjchair.diagnosis.data.roughly_known import Nuisance
+from mjchair.diagnosis.evidence import _edges
 from mjchair.diagnosis.explain.column_ids import Driver, Quantity
 from mjchair.diagnosis.explain.missing_force import Products, mean_forces
 from mjchair.diagnosis.fit.column_ids import ParameterId
@@ -567,6 +568,16 @@ def test_time_stands_below_the_map():
     assert begins == [0.0, 10.0]  # s: the second trial follows the first
 
 
+def test_values_that_nearly_agree_are_one_level():
+    """Four points of a coast stood above one another, at torques of zero but for noise."""
+    rng = np.random.default_rng(1)
+    torque = np.r_[rng.normal(0.0, 0.05, 60), rng.uniform(2.0, 10.0, 40)]
+    edges = _edges(torque)
+    assert np.diff(edges).min() > 0.04 * np.ptp(torque)
+    assert edges[[0, -1]].tolist() == [torque.min(), torque.max()]
+    assert _edges(np.linspace(0.0, 1.0, 81)) == pytest.approx(np.linspace(0.0, 1.0, 9))
+
+
 def test_a_channel_is_drawn_once():
     run = evidence(channels=1).runs[0]
     assert whole_runs.telling(run, 2) == [0]
@@ -578,6 +589,8 @@ def test_places_are_drawn_as_differences_and_after_speeds():
     run = evidence().runs[0]
     shown = [run.channels[k] for k in whole_runs.telling(run, 9)]
     assert shown.index("position.x") > shown.index("imu_gyro.x")
+    (first,) = whole_runs.telling(run, 1, ["position.x"])  # its sensor is at fault
+    assert run.channels[first] == "position.x"
     alone = dataclasses.replace(
         run,
         channels=("position.x",),

@@ -39,6 +39,7 @@ from mjchair.simulation.channels import channels
 
 Array = NDArray[np.float64]
 SHOWN = 3  # whole runs
+NARROW = 0.04  # of the range: levels that are no wider lie on one another in a figure
 LEVELS = 8  # of what a force may go with
 
 
@@ -147,7 +148,7 @@ def _levels(
     mine: NDArray[np.int64],
     values: Array,
 ) -> ForceLevels | None:
-    """Mean forces at levels with equally many pulses; None where there are not two levels.
+    """Mean forces at levels with about equally many pulses; None where there are not two levels.
 
     Args:
       mine: (n,), which of the pulses are of this kind. values: (n,), of what it may go with.
@@ -155,7 +156,7 @@ def _levels(
     known = np.isfinite(values)
     if not known.any():
         return None
-    edges = np.unique(np.quantile(values[known], np.linspace(0.0, 1.0, LEVELS + 1)))
+    edges = _edges(values[known])
     if edges.size < 3 or np.ptp(edges) < 1e-6:
         return None
     place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, edges.size - 2)
@@ -165,6 +166,20 @@ def _levels(
     value, std = missing_force.mean_forces(products, pulses, force, level)
     middle = np.array([values[known][place[known] == p].mean() for p in kept])
     return ForceLevels(middle=middle, value=value, std=std)
+
+
+def _edges(values: Array) -> Array:
+    """Edges of levels with equally many values (n,); values that nearly agree are one level.
+
+    Half of all torques are those of a coast, zero but for noise.
+    """
+    edges = np.quantile(values, np.linspace(0.0, 1.0, LEVELS + 1))
+    least = NARROW * np.ptp(edges)
+    kept = [edges[0]]
+    for edge in edges[1:-1]:
+        if edge - kept[-1] > least and edges[-1] - edge > least:
+            kept.append(edge)
+    return np.array([*kept, edges[-1]])
 
 
 def _at(along: dict[str, Array], pulse: Pulse) -> dict[str, float]:

@@ -23,7 +23,8 @@ def figure(diagnosis: Diagnosis) -> Figure | None:
     if evidence is None or not evidence.runs or diagnosis.gap is None:
         return None
     run = evidence.runs[0]
-    channels = telling(run, 1)
+    lacks = any(e.of_chair for e in diagnosis.effects)
+    channels = telling(run, 1, [e.channel for e in diagnosis.effects if e.channel and not lacks])
     if not channels:
         return None
     drawn = Figure(figsize=(9.4, 3.3), layout="constrained")

@@ -6,6 +6,8 @@ itself covers far more than the differences, such as a position over 5 m, the di
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
@@ -57,10 +59,13 @@ def figure(diagnosis: Diagnosis) -> Figure | None:
     return drawn
 
 
-def telling(run: WholeRun, most: int) -> list[int]:
+def telling(run: WholeRun, most: int, at_fault: Collection[str] = ()) -> list[int]:
     """The channels with the largest difference against noise, one of a kind, rates before places.
 
     Left and right of the same channel are one kind.
+
+    Args:
+      at_fault: channels that stand before all others.
     """
     against = run.measured if run.after is None else run.after
     miss = (against - run.before) / run.noise
@@ -70,7 +75,12 @@ def telling(run: WholeRun, most: int) -> list[int]:
         for k, column in enumerate(miss.T)
         if np.isfinite(column).any()
     }
-    order = sorted(size, key=lambda k: (_is_place(run.channels[k]), -size[k]))
+
+    def rank(k: int) -> tuple[bool, bool, float]:
+        name = run.channels[k]
+        return name not in at_fault, _is_place(name), -size[k]
+
+    order = sorted(size, key=rank)
     kinds: dict[str, int] = {}
     for k in order:
         kinds.setdefault(run.channels[k].removeprefix("left_").removeprefix("right_"), k)
