@@ -120,6 +120,16 @@ def test_what_acts_in_all_runs_is_not_of_one_run_though_one_alone_shows_it(shows
     assert found_in(*problem((1.5, 1.5, 1.5), shows)) is None
 
 
+def test_what_the_other_runs_only_do_not_show_is_not_of_one_run_whatever_else_was_chosen():
+    """Two numbers were chosen of a motor, and one of them "in the slalom alone" had 96 %."""
+    base, drag = problem((1.5, 1.5, 1.5), (0.02, 1.0, 0.0))
+    dearer = SimpleNamespace(keys=("drag",), free=2, penalty=20.0, name="drag")
+    choice = SimpleNamespace(hypothesis=dearer, fitted=drag.fitted)
+    assert found_in(base, choice, excess=1.0) is None
+    base, drag = problem((0.0, 1.5, 0.0), (1.0, 1.0, 1.0))
+    assert found_in(base, SimpleNamespace(hypothesis=dearer, fitted=drag.fitted)) is not None
+
+
 def test_one_run_has_no_others_to_differ_from():
     assert found_in(*problem((1.5,), (1.0,), ("east",))) is None
 
@@ -136,6 +146,7 @@ def test_in_the_place_of_what_is_no_answer_it_need_only_fit_better_and_close_the
     assert not rules.may_be_of_one_run(by=4.0, gain=600.0, excess=910.0)
     base, drag = problem((0.6, 1.5, 0.7))
     assert found_in(base, drag) is None
+    base, drag = problem((0.0, 1.5, 0.0))
     near = SimpleNamespace(hypothesis=drag.hypothesis, fitted=SimpleNamespace(total=0.0))
     west = base.acting_alone
     near.fitted.total = base.reduced.total - west.options[0].gain + 4.0

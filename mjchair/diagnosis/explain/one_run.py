@@ -7,7 +7,7 @@ out: where they only do not show an effect, it brings as much in all runs, and i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
@@ -78,7 +78,7 @@ def in_one_run(base: Base, gap: Gap, choice: Choice | None) -> InOneRun | None:
     """
     fitted = choice.fitted if choice else base.plain
     price = fitted.total + (choice.hypothesis.penalty if choice else 0.0)
-    acting = base.acting_alone
+    acting = _ruled_out_elsewhere(base)
     if acting is None:
         return None
     best = acting.options[0]
@@ -104,6 +104,22 @@ def in_one_run(base: Base, gap: Gap, choice: Choice | None) -> InOneRun | None:
         sure=sure,
         alike=rival,
     )
+
+
+def _ruled_out_elsewhere(base: Base) -> ActingIn | None:
+    """The effects in the run in which one brings most that the other runs rule out; None: none.
+
+    What acts in all runs fits as well where the others only do not show it: of a slalom and two
+    coasts, one shows what the left motor lacks.
+    """
+    acting = base.acting_alone
+    if acting is None:
+        return None
+    everywhere = {h.name: 0.0 for h in acting.options}
+    for h in hypotheses.singles(base.reduced, base.starts):
+        everywhere[h.name] = max(everywhere.get(h.name, 0.0), h.score)
+    options = [h for h in acting.options if h.score > everywhere[h.name] + rules.TIE]
+    return replace(acting, options=options) if options else None
 
 
 def _by_chance(base: Base, acting: ActingIn) -> float:
