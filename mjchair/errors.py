@@ -21,6 +21,9 @@ OTHER_WORDS = {
     "position": "angle",
     "acceleration": "accelerometer",
     "gyroscope": "gyro",
+    "rider": "occupant",
+    "user": "occupant",
+    "person": "occupant",
 }
 
 

@@ -16,6 +16,7 @@ from mjchair.measurement import samples
 from mjchair.measurement.clocks import Signal, align, best_alignment
 from mjchair.measurement.delimited import read_delimited
 from mjchair.measurement.exports import matching, read_export, read_formats
+from mjchair.measurement.gather import study_file
 from mjchair.measurement.gather.coasts import coasts, pushes
 from mjchair.measurement.gather.gather import gather, table_text
 from mjchair.measurement.gather.join import GatheredTrial
@@ -102,6 +103,17 @@ def test_the_study_has_a_comment_at_every_line_and_can_be_read(gathered, tmp_pat
     study = mjchair.read_study(tmp_path)
     assert study.runs[0].trial.inputs.controls.keys() == {"left_wheel", "right_wheel"}
     assert study.spec.compile().body_mass.sum() == pytest.approx(92.0, abs=0.01)
+
+
+@pytest.mark.parametrize(("torque", "pushed"), [(0.0, False), (0.3, False), (8.0, True)])
+def test_a_rim_that_nobody_pushes_is_no_hands_torque(torque, pushed):
+    time = np.linspace(0.0, 2.0, 21)
+    trial = GatheredTrial(
+        "coast", time, {"left_wheel": np.r_[np.full(20, torque), np.nan]}, "coast"
+    )
+    assert trial.driven and trial.pushed is pushed
+    said = "with a hand's torque" if pushed else "no torque: it rolls freely"
+    assert said in "\n".join(study_file._trial(trial, held_out=False))
 
 
 def test_what_cannot_be_known_is_asked_for_by_name(folder):

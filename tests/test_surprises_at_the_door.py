@@ -91,6 +91,12 @@ def test_the_nearest_name_is_one_that_may_be_meant(said, meant, manual):
     assert closest(said, {*KNOWN, *sensors(manual)}) == meant
 
 
+@pytest.mark.parametrize("word", ["rider", "user", "person"])
+def test_who_sits_in_the_chair_is_the_occupant(word):
+    """`chair_mass` was proposed, which is the mass of something else."""
+    assert closest(f"{word}_mass", ["chair_mass", "occupant_mass", "wheel_mass"]) == "occupant_mass"
+
+
 def test_a_table_of_semicolons_and_decimal_commas_is_read(tmp_path):
     table = read_table(write(tmp_path / "a.csv", "time;left_wheel\n0;1,5\n0,1;-2\n"))
     assert list(table.time) == [0.0, 0.1] and list(table.columns["left_wheel"]) == [1.5, -2.0]
