@@ -270,7 +270,7 @@ def test_what_cannot_be_is_tried_once(fits):
     tries = len(fits.asked)
     assert looking.fit(ONE) is None
     assert len(fits.asked) == tries
-    assert looking.dropped == ["rolling was not tried further: no chair"]
+    assert looking.dropped == ["a start of the fit of rolling was left out: no chair"]
 
 
 def test_a_fit_that_still_promises_is_made_anew(fits):

@@ -152,7 +152,8 @@ class MultiStart:
         try:
             fitted = self._refit(share)
         except (MjchairError, np.linalg.LinAlgError) as error:
-            self.note(f"{self.hypothesis.label} was not tried further: {error}")
+            why = str(error).partition(";")[0]  # what a user would do about it is no use here
+            self.note(f"a start of the fit of {self.hypothesis.label} was left out: {why}")
             return None
         if self._is_behind(fitted):
             pass  # what it would gain if all were made anew decides nothing

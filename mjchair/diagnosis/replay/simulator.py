@@ -164,7 +164,8 @@ class WindowSimulator:
         except (ValueError, mujoco.FatalError) as error:
             line = " ".join(str(error).split())
             if any(words in line for words in NO_BODY):
-                line = "it asks for a mass or an inertia that no body has"
+                line = "no body can have the mass or the inertia that an effect asks for"
+                raise MjchairError(line) from None
             raise MjchairError(f"an effect does not compile: {line}") from None
 
     def coarsened(self, model: mujoco.MjModel) -> mujoco.MjModel:
