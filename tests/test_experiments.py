@@ -270,6 +270,11 @@ def test_a_lab_without_torque_gets_none():
     assert len(possible(Setting((0.0, 0.0), 0.0, 10.0))) == len(LIBRARY)
 
 
+def test_hands_are_not_asked_to_hold_a_torque_for_seconds():
+    by_hand = {m.name for m in possible(Setting((0.0, 0.0), 0.0, 10.0, by_hand=True))}
+    assert set(BY_NAME) - by_hand == {"long steps", "circle"}
+
+
 def test_with_one_wheel_measured_nothing_that_turns_is_asked_for():
     """The other wheel is taken to roll alike, which a spin on the spot does not."""
     asked = {m.name for m in possible(Setting((0.0, 0.0), 0.0, 10.0, straight=True))}

@@ -34,7 +34,7 @@ class Manoeuvre:
       speed: at the start, m/s. turned: heading against the study's, rad. yaw_rate: rad/s.
       torque: time (s) -> left and right torque as shares of the study's largest; None: a coast.
       shift: of the start, m, ahead and to the left. load: that is strapped to the seat.
-      seconds: how long, s.
+      seconds: how long, s. motor: whether it holds a torque for seconds, as no hand does.
     """
 
     name: str
@@ -46,6 +46,7 @@ class Manoeuvre:
     shift: tuple[float, float] = (0.0, 0.0)
     load: Load | None = None
     seconds: float = SECONDS
+    motor: bool = False
 
     @property
     def turns(self) -> bool:
@@ -64,6 +65,7 @@ class Setting:
       position: (x, y) m and heading (rad) of a start. torque: largest, N m; 0 where none is told.
       run: name of the run that starts there.
       straight: whether only one wheel is measured, and taken for both.
+      by_hand: whether hands on rims push it.
     """
 
     position: tuple[float, float]
@@ -71,6 +73,7 @@ class Setting:
     torque: float
     run: str = ""
     straight: bool = False
+    by_hand: bool = False
 
     def initial(self, manoeuvre: Manoeuvre) -> Initial:
         """How the manoeuvre starts here."""
@@ -105,7 +108,7 @@ def setting(study: Study) -> Setting:
     torque = float(np.median([_peak(inputs) for inputs in driven] or [0.0]))
     place = first.position or (0.0, 0.0)
     heading, straight = first.heading or 0.0, bool(study.copied)
-    return Setting(place, heading, torque, coast.trial.name, straight)
+    return Setting(place, heading, torque, coast.trial.name, straight, study.torque_measured)
 
 
 def _peak(inputs: Inputs) -> float:
@@ -115,12 +118,15 @@ def _peak(inputs: Inputs) -> float:
 def possible(here: Setting) -> list[Manoeuvre]:
     """The manoeuvres that a lab can make and see.
 
-    Those with torque only where it measures torque, and with one wheel for both only straight ones.
+    Those with torque only where it measures torque, with one wheel for both only straight ones,
+    and by hand none that only a motor can make.
     """
     return [
         m
         for m in LIBRARY
-        if (m.torque is None or here.torque > 0.0) and not (m.turns and here.straight)
+        if (m.torque is None or here.torque > 0.0)
+        and not (m.turns and here.straight)
+        and not (m.motor and here.by_hand)
     ]
 
 
@@ -228,6 +234,7 @@ LIBRARY = (  # simplest first
         "long steps",
         "Drive straight from a standstill, torque on and off, 2 s each",
         torque=_steps(2.0),
+        motor=True,
     ),
     Manoeuvre(
         "reverse, then forward",
@@ -250,6 +257,7 @@ LIBRARY = (  # simplest first
         1.0,
         yaw_rate=0.5,
         torque=_circle,
+        motor=True,
     ),
     Manoeuvre("loaded coast", "Coast from 1.8 m/s" + _SEAT, COAST, load=LOAD),
     Manoeuvre(
