@@ -332,20 +332,18 @@ def test_what_is_named_beside_more_that_is_missing_is_no_last_word():
         more_missing=True,
     )
     assert "look for what is left" in words.next_step(found)
-    assert "of the gap, and a remainder is left. The model of the chair lacks" in words.missing(
-        found
-    )
+    assert "of the gap; a remainder is left. The model of the chair lacks" in words.missing(found)
     found.gap = dataclasses.replace(found.gap, scope="held-out trials")
     falls = "of the gap in the runs of the fit (from 3.0 to 0.9 times the noise in those held out)"
-    assert f"{falls}, and a remainder is left. " in words.missing(found)
+    assert f"{falls}; a remainder is left. " in words.missing(found)
     found.gap = dataclasses.replace(found.gap, after=2.95)
-    assert "of the fit (those held out stay at 3.0 times the noise), and" in words.missing(found)
+    assert "of the fit (those held out stay at 3.0 times the noise); a" in words.missing(found)
     found.gap = dataclasses.replace(found.gap, scope="", after=0.9)
     found.correction = Variant((), {"mass": -3.0, "centre_x": 2.0})
-    said = "gap only with the mass of chair and person together as far from the chair of the study "
-    assert said + "as is believed. The model" in words.missing(found)
+    said = "only with a chair at the end of what the study allows (the mass of chair and person "
+    assert f"gap, and {said}together). The model" in words.missing(found)
     found.gap = dataclasses.replace(found.gap, after=1.3)
-    assert "as is believed, and a remainder is left. The model" in words.missing(found)
+    assert "together); a remainder is left. The model" in words.missing(found)
 
 
 def test_how_probable_a_lone_effect_is_stands_in_the_first_sentence():

@@ -265,14 +265,18 @@ def remainder_words(diagnosis: Diagnosis) -> str:
     if not diagnosis.more_missing:
         return ""
     closed = max((e.closure for e in diagnosis.effects), default=0.0)
-    goes = ", which goes with " + str(diagnosis.drivers[0].goes_with) if diagnosis.drivers else ""
-    ends = _at_their_ends(diagnosis)
-    only = f" only with {ends} as far from the chair of the study as is believed" if ends else ""
-    after = diagnosis.gap.after if diagnosis.gap else None
-    left = f", and a remainder is left{goes}" if not ends or after is None or after > 1.0 else ""
     share_closed = per_cent(closed) if closed < ALL else "nearly all"
-    explains = f"that explains {share_closed} of the gap{_held_out(diagnosis)}{only}{left}"
-    return f"More is missing than what is named here: {explains}. "
+    ends = _at_their_ends(diagnosis)
+    only = f", and only with a chair at the end of what the study allows ({ends})" if ends else ""
+    after = diagnosis.gap.after if diagnosis.gap else None
+    left = ""
+    if not ends or after is None or after > 1.0:
+        goes = str(diagnosis.drivers[0].goes_with) if diagnosis.drivers else ""
+        left = f"; what is left goes with {goes}" if goes else "; a remainder is left"
+    return (
+        f"More is missing than what is named here, which explains {share_closed} of the gap"
+        f"{_held_out(diagnosis)}{only}{left}. "
+    )
 
 
 def _held_out(diagnosis: Diagnosis) -> str:
