@@ -117,7 +117,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     if alone is not None and not rules.says_one_run(said, alike=alone.alike):
         alone = None
     if alone is not None:
-        probability = with_one_run(probability, alone.by)
+        probability = with_one_run(probability, alone.by, alone.sure)
     named = choice if said in (Verdict.NAMED, Verdict.AMBIGUOUS) else None
     left = missing(choice.after if choice else gap)
     undecided = named if said == Verdict.AMBIGUOUS else None

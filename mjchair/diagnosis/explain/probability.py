@@ -75,13 +75,16 @@ def with_gap(probability: Mapping[str, float], p: float) -> dict[str, float]:
     return dict(sorted(out.items(), key=lambda item: -item[1]))
 
 
-def with_one_run(probability: Mapping[str, float], by: float) -> dict[str, float]:
+def with_one_run(probability: Mapping[str, float], by: float, sure: bool) -> dict[str, float]:
     """Probabilities where an effect in one run alone explains more, as another hypothesis, ONE_RUN.
 
     Args:
       probability: of hypotheses. by: chi2, with penalties, by which it is better than the best.
+      sure: whether no choice stands against it. Where one does, it is one more rival, and what
+        speaks for it is divided as between all rivals.
     """
-    odds = math.exp(min(0.5 * by, LARGE)) * PRIOR_ONE_RUN
+    temper = 1.0 if sure else calibration.shipped().temper
+    odds = math.exp(min(0.5 * by / temper, LARGE)) * PRIOR_ONE_RUN
     out = {name: p / (1.0 + odds) for name, p in probability.items()}
     out[ONE_RUN] = odds / (1.0 + odds)
     return dict(sorted(out.items(), key=lambda item: -item[1]))
