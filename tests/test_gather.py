@@ -16,7 +16,7 @@ from mjchair.measurement import samples
 from mjchair.measurement.clocks import Signal, align, best_alignment
 from mjchair.measurement.delimited import read_delimited
 from mjchair.measurement.exports import matching, read_export, read_formats
-from mjchair.measurement.gather import study_file
+from mjchair.measurement.gather import join, study_file
 from mjchair.measurement.gather.coasts import coasts, pushes
 from mjchair.measurement.gather.gather import gather, table_text
 from mjchair.measurement.gather.join import GatheredTrial
@@ -108,10 +108,10 @@ def test_the_study_has_a_comment_at_every_line_and_can_be_read(gathered, tmp_pat
 @pytest.mark.parametrize(("torque", "pushed"), [(0.0, False), (0.3, False), (8.0, True)])
 def test_a_rim_that_nobody_pushes_is_no_hands_torque(torque, pushed):
     time = np.linspace(0.0, 2.0, 21)
-    trial = GatheredTrial(
-        "coast", time, {"left_wheel": np.r_[np.full(20, torque), np.nan]}, "coast"
-    )
-    assert trial.driven and trial.pushed is pushed
+    columns = {"left_wheel": np.r_[np.full(20, torque), np.nan]}
+    assert join._is_pushed(time, columns) is pushed
+    trial = GatheredTrial("run", time, columns, "push" if pushed else "coast")
+    assert trial.driven
     said = "with a hand's torque" if pushed else "no torque: it rolls freely"
     assert said in "\n".join(study_file._trial(trial, held_out=False))
 

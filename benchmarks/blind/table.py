@@ -21,7 +21,7 @@ OPEN = ("unknown", "ambiguous")
 # wind is the generator's own
 UNCOUNTED = ("mass", "phase", "radius", "drag_area")
 ALIKE = 0.95  # |cos| beyond which two effects cannot be told apart
-RULED_OUT = 9.0  # chi2 behind the truth: what is nearer fits as well, for whoever looks at the data
+RULED_OUT = 9.0  # chi2 behind the truth: what is nearer fits as well as the truth does
 
 
 def truth(line: dict) -> set[str]:

@@ -96,10 +96,11 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     likely = of_any(probability, _standing_keys(choice)) if choice else 0.0
     answer = choice if said != Verdict.UNKNOWN or rules.is_likely(likely) else None
     size = material(base, gap, answer, sure_alone)
+    foretold = gap_foretold(base)
     if not rules.matters(
         force=size.value,
         limit=size.limit,
-        gap=gap_foretold(base),
+        gap=foretold,
         excess=gap.excess_sigmas,
         p=chance,
         told=base.bench.simulator.study.material is not None,
@@ -119,6 +120,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     if alone is not None:
         probability = with_one_run(probability, alone.by, alone.sure)
     named = choice if said in (Verdict.NAMED, Verdict.AMBIGUOUS) else None
+    held = stands.held_out if named and stands else None
     left = missing(choice.after if choice else gap)
     undecided = named if said == Verdict.AMBIGUOUS else None
     once = bool(stands and stands.once)
@@ -130,7 +132,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         effects=_named(named.fitted, closed) if named else [],
         alternatives=sets,
         candidates=_candidates(base, gap, choice),
-        gap=_summary(base, gap, named, stands.held_out if stands else None),
+        gap=_summary(base, gap, named, over_noise(held.after, held.dof) if held else foretold),
         where=_where(base),
         next_experiment=_following(base, choice, said, plan, left, alone),
         notes=[
@@ -428,23 +430,23 @@ def _shown_windows(base: Base) -> NDArray[np.int64]:
     return held if held.size else base.bench.windows
 
 
-def _summary(base: Base, gap: Gap, choice: Choice | None, held: rules.HeldOut | None) -> GapSummary:
-    """The gap as it was, and as the corrected chair leaves it; without one there is no after."""
+def _summary(base: Base, gap: Gap, choice: Choice | None, unforeseen: float) -> GapSummary:
+    """The gap as it was, and as the corrected chair leaves it; without one there is no after.
+
+    Args:
+      unforeseen: of it, as `GapSummary` has it, where a trial is held out.
+    """
     windows = _shown_windows(base)
     before, dof = slow_part(base.plain.system, windows)
     is_held = bool(held_windows(base).size)
     who = "held-out trials" if is_held else "all trials, since none is held out"
-    if choice is None:
-        unforeseen = gap_foretold(base) if is_held else None
-    else:
-        unforeseen = over_noise(held.after, held.dof) if held else None
     return GapSummary(
         before=over_noise(before, dof),
         after=over_noise(slow_part(choice.fitted.system, windows)[0], dof) if choice else None,
         scope=f"{who}: rms of the whitened residual below {BAND:g} Hz",
         p_value=gap.p,
         p_value_after=choice.after.p if choice else None,
-        unforeseen=unforeseen,
+        unforeseen=unforeseen if is_held else None,
     )
 
 

@@ -104,18 +104,18 @@ def shares(bench: Bench) -> dict[str, float]:
 def forward_levels(bench: Bench) -> list[dict[str, float]]:
     """How hard what shakes the chair pushes it forward: run of the fit -> N, kind by kind.
 
-    Runs of a kind have one manoeuvre, with torques or without. None where study.toml gives the
-    level.
+    Runs of a kind have one manoeuvre, with torques or without. No kind is listed where study.toml
+    gives the level.
     """
     study, shaking = bench.simulator.study, bench.process
-    if shaking is None or set(NAMED["drive"][0]) & set(noise_levels.known_parts(study)):
+    if shaking is None or study.process.get("drive") is not None:
         return []
-    parts = np.array([shaking.levels[part] for part in NAMED["drive"][0]])
+    levels = process.run_levels(shaking.levels, "drive")
     kinds: dict[tuple[str, bool], dict[str, float]] = {}
     for k in study.fitted:
         run = study.runs[k]
         kind = kinds.setdefault((run.manoeuvre, run.trial.inputs is None), {})
-        kind[run.trial.name] = float(np.linalg.norm(parts[:, k]))
+        kind[run.trial.name] = float(levels[k])
     return list(kinds.values())
 
 

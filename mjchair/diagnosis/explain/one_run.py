@@ -115,10 +115,10 @@ def _ruled_out_elsewhere(base: Base) -> ActingIn | None:
     acting = base.acting_alone
     if acting is None:
         return None
-    everywhere = {h.name: 0.0 for h in acting.options}
-    for h in hypotheses.singles(base.reduced, base.starts):
-        everywhere[h.name] = max(everywhere.get(h.name, 0.0), h.score)
-    options = [h for h in acting.options if h.score > everywhere[h.name] + rules.TIE]
+    everywhere = {h.name: h.score for h in hypotheses.singles(base.reduced, base.starts)}
+    options = [
+        h for h in acting.options if h.score > max(everywhere.get(h.name, 0.0), 0.0) + rules.TIE
+    ]
     return replace(acting, options=options) if options else None
 
 

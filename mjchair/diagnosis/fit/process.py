@@ -254,5 +254,9 @@ def _angles(
 
 def level(levels: Levels, name: str) -> float:
     """Standard deviation of what a name of NAMED stands for, the mean over runs."""
-    parts = [levels[p] for p in NAMED[name][0]]
-    return float(np.sqrt(np.mean(np.sum(np.square(parts), axis=0))))
+    return float(np.sqrt(np.mean(run_levels(levels, name) ** 2)))
+
+
+def run_levels(levels: Levels, name: str) -> Array:
+    """Standard deviation (runs,) of what a name of NAMED stands for."""
+    return np.asarray(np.linalg.norm([levels[p] for p in NAMED[name][0]], axis=0))

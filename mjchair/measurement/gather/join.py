@@ -65,12 +65,6 @@ class GatheredTrial:
         """Whether a wheel's torque is among the columns."""
         return bool({"left_wheel", "right_wheel"} & set(self.columns))
 
-    @property
-    def pushed(self) -> bool:
-        """Whether a wheel's torque is ever more than the offset of a sensor."""
-        torques = (self.columns.get(side, np.zeros(1)) for side in ("left_wheel", "right_wheel"))
-        return any(np.nanmax(np.abs(torque), initial=0.0) > IDLE for torque in torques)
-
 
 def join(
     name: str, instruments: Sequence[Instrument], agreed: Mapping[str, Alignment] | None = None

@@ -145,7 +145,8 @@ def _trial(trial: GatheredTrial, held_out: bool) -> list[str]:
     names = ", ".join(one.name for one in trial.instruments)
     lasts = trial.time[-1] - trial.time[0]
     out = ["[[trial]]", _line(f'file = "{trial.name}.csv"', f"{lasts:.1f} s of {names}")]
-    word = "with a hand's torque" if trial.pushed else "no torque: it rolls freely"
+    is_push = trial.manoeuvre == "push"
+    word = "with a hand's torque" if is_push else "no torque: it rolls freely"
     out.append(_line(f'manoeuvre = "{trial.manoeuvre}"', f"{word}; runs of one word are compared"))
     kept = "kept for the final check" if held_out else "used to fit"
     out.append(_line(f"hold_out = {'true' if held_out else 'false'}", f"{kept}; keep at least one"))
