@@ -410,6 +410,7 @@ def _fit(base: Any, hypothesis: Hypothesis) -> Any:
         variant=SimpleNamespace(terms=tuple(terms), offsets={}),
         system=inner,
         total=total,
+        confined=0.0,
         promised=total,
         chi2=np.array([bounded.chi2(system, int(i), step_) for i in windows]),
         std=std,
@@ -430,6 +431,7 @@ def base_of(bed: Bed, y: Sequence[Array]) -> Any:
     step_ = bounded.solve(system, bed.windows, [])[0] if bed.kept.nuisance else nothing
     plain = SimpleNamespace(
         total=reduced.total,
+        confined=0.0,
         chi2=np.array([bounded.chi2(system, int(i), step_) for i in bed.windows]),
         system=system,
         columns=[],

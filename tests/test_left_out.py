@@ -8,8 +8,11 @@ import pytest
 from noisy_run import NOISE, noisy_run
 
 import mjchair
+from mjchair.diagnosis import rules
 from mjchair.diagnosis.data.study import make_study
 from mjchair.diagnosis.explain import left_out
+from mjchair.diagnosis.explain.choice import Choice, Tried
+from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.left_out import held_out
 from mjchair.diagnosis.explain.screening import prepare, screen_columns
 from mjchair.diagnosis.fit import bounded
@@ -120,7 +123,7 @@ def test_what_is_only_roughly_known_changes_no_more_than_the_fit_leaves_open(bas
     fitted = replace(plain, track=SimpleNamespace(predicted=moved))
     at = plain.system.places[name]
     known = np.linalg.inv(bounded.covariance(plain.system, base.bench.windows))
-    assert left_out._changed(base, fitted, held) <= known[at, at] * (1.0 + 1e-6)
+    assert left_out._changed(base, plain, fitted, held) <= known[at, at] * (1.0 + 1e-6)
 
 
 def test_what_a_fit_moved_of_a_sensor_is_no_change_where_its_effect_takes_it_over(base):
@@ -194,3 +197,26 @@ def test_a_held_out_run_that_alone_shows_what_is_missing_is_told(monkeypatch):
         found = left_out.lone_run(base, fitted)
         assert found == said
     assert "Hold out another run than turn" in wording.letting_in("turn", 7.0, 2.0)
+
+
+@pytest.mark.parametrize(("after", "spoken_against"), [(490.0, True), (60.0, False)])
+def test_an_effect_that_held_out_trials_speak_against_may_be_nothing(
+    after, spoken_against, monkeypatch
+):
+    """Casters that shimmied took torques 8 and 12 % too low for themselves, and both were named."""
+    drive, shimmy = (SimpleNamespace(effect=SimpleNamespace(key=k)) for k in ("drive", "shimmy"))
+    both, alone = (Hypothesis(s, 0.0, 0.0) for s in ((shimmy, drive), (shimmy,)))
+    bare = SimpleNamespace(total=900.0, confined=0.0)
+    fewer = Tried(alone, bare)
+    known = Tried(Hypothesis((drive,), 0.0, 0.0), bare)
+    choice = Choice(
+        hypothesis=both, fitted="both", after=None, rivals=[[], [known]], own_gains=[1.0, 1.0],
+        tried=[fewer, Tried(both, bare)],
+    )  # fmt: skip
+    held = rules.HeldOut(before=500.0, after=after, dof=50.0, changed=400.0)
+    asked = []
+    monkeypatch.setattr(left_out, "on_held_out", lambda *a: asked.append(a[1:]) or held)
+    monkeypatch.setattr(Hypothesis, "penalty", 0.0)
+    found = left_out.with_spoken_against("base", choice)
+    assert asked == [("both", bare)]  # without the shimmy nothing was fitted
+    assert found.rivals == [[], [known, fewer] if spoken_against else [known]]

@@ -41,7 +41,7 @@ def base(size, alike=0.0, force=0.0):
     columns = [s.columns[0] for s in starts]
     columns.append(ForceColumn(ForceGroup(Force.FORWARD, Driver(Quantity.SPEED)), 0))
     reduced = bounded.reduce(linear_system.system(columns, J, r), [0])
-    plain = SimpleNamespace(total=reduced.total)
+    plain = SimpleNamespace(total=reduced.total, confined=0.0)
     return SimpleNamespace(reduced=reduced, starts=starts, plain=plain)
 
 
@@ -50,6 +50,7 @@ def fit(known, *effects):
     hypothesis = hypotheses.weigh(known.reduced, effects)
     fitted = SimpleNamespace(
         total=known.plain.total - hypothesis.gain,
+        confined=0.0,
         sigmas={s.effect.name: math.sqrt(max(hypothesis.gain, 0.0)) for s in effects},
         variant=Variant(()),
     )

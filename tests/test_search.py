@@ -59,6 +59,7 @@ def fit(total, *keys, promised=None):
     terms = tuple(SimpleNamespace(effect=SimpleNamespace(key=k), parameters=()) for k in keys)
     return SimpleNamespace(
         total=total,
+        confined=0.0,
         promised=total if promised is None else promised,
         variant=Variant((), terms=terms),
         track=f"track of {'+'.join(sorted(keys))}",
@@ -457,10 +458,10 @@ def test_the_more_common_of_two_effects_comes_first_within_their_form(
 @pytest.mark.parametrize(("total", "both_sides"), [(1099.5, True), (1100.5, True), (1102.0, False)])
 def test_both_sides_are_free_where_the_data_leave_open_which_it_is(total, both_sides, monkeypatch):
     """Of two wheels that differ by 1 mm, a rival came in by the right one alone."""
-    right = Tried(Hypothesis((MOTOR,), 500.0, 490.0), SimpleNamespace(total=1100.0))
+    right = Tried(Hypothesis((MOTOR,), 500.0, 490.0), SimpleNamespace(confined=0.0, total=1100.0))
     both = Hypothesis((SimpleNamespace(effect=MOTOR.effect, free=("left", "right")),), 500.0, 480.0)
     looking = SimpleNamespace(
-        fit=lambda h, best: Tried(h, SimpleNamespace(total=total)),
+        fit=lambda h, best: Tried(h, SimpleNamespace(confined=0.0, total=total)),
         near_to=lambda _: nullcontext(),
         weigh=lambda _: SimpleNamespace(gain=500.0),
         base=SimpleNamespace(starts=()),
@@ -474,10 +475,13 @@ def test_both_sides_are_free_where_the_data_leave_open_which_it_is(total, both_s
 
 def chosen(hypothesis, tried, own_gains):
     """A choice without rivals of what was fitted, (hypothesis, chi2) each, all really there."""
-    fits_made = [Tried(h, SimpleNamespace(total=total, variant=Variant(()))) for h, total in tried]
+    fits_made = [
+        Tried(h, SimpleNamespace(confined=0.0, total=total, variant=Variant(())))
+        for h, total in tried
+    ]
     return Choice(
         hypothesis=hypothesis,
-        fitted=SimpleNamespace(total=1e3, variant=Variant(())),
+        fitted=SimpleNamespace(confined=0.0, total=1e3, variant=Variant(())),
         after=None,
         rivals=[[] for _ in hypothesis.starts],
         own_gains=own_gains,
@@ -506,7 +510,9 @@ def test_both_sides_are_freed_by_a_fit_where_linear_algebra_says_nothing(
         for free in (("right",), ("left", "right"))
     )
     at = Term(sides, {"left": 0.0, "right": 1.27}, ("right",))
-    chosen = SimpleNamespace(total=1100.0, variant=Variant((), terms=(at,)), track="track")
+    chosen = SimpleNamespace(
+        confined=0.0, total=1100.0, variant=Variant((), terms=(at,)), track="track"
+    )
     best = Tried(Hypothesis((right,), 500.0, 490.0), chosen)
     kept = []
 
@@ -514,7 +520,9 @@ def test_both_sides_are_freed_by_a_fit_where_linear_algebra_says_nothing(
         parameters = [ParameterId("wheel", side) for side in start.terms[0].free]
         assert before == "track" and len(parameters) == 2
         parameter.name = "right"
-        return SimpleNamespace(total=total, variant=start, std=dict.fromkeys(parameters, std))
+        return SimpleNamespace(
+            confined=0.0, total=total, variant=start, std=dict.fromkeys(parameters, std)
+        )
 
     monkeypatch.setattr(selection, "freed", lambda _, hypothesis: hypothesis)
     monkeypatch.setattr(selection, "made_anew", made)
@@ -908,11 +916,11 @@ def test_one_window_neither_rules_a_rival_out_nor_keeps_it(worse, stays):
     scatter = np.resize([4.0, -4.0], len(worse))
     ours = np.full(len(worse), 100.0)
     total = ours.sum()
-    chosen = Tried(ONE, SimpleNamespace(total=total, chi2=ours, at_bound=()))
+    chosen = Tried(ONE, SimpleNamespace(confined=0.0, total=total, chi2=ours, at_bound=()))
     theirs = ours + np.array(worse) + scatter
     rival = Tried(
         Hypothesis((MOTOR,), 400.0, 390.0),
-        SimpleNamespace(total=theirs.sum(), chi2=theirs, at_bound=()),
+        SimpleNamespace(confined=0.0, total=theirs.sum(), chi2=theirs, at_bound=()),
     )
     assert rivals._not_ruled_out(rival, chosen, 12_000.0) == stays
 
@@ -980,8 +988,10 @@ def test_a_rival_of_one_effect_is_weighed_against_what_that_effect_brings(
     near = {}
     of_all = np.resize([4.0, -4.0], 20)
     bare = {"at_bound": (), "variant": Variant(())}
-    ours = SimpleNamespace(total=1_000.0, chi2=np.full(20, 50.0), **bare)
-    theirs = SimpleNamespace(total=1_000.0 + worse, chi2=50.0 + worse / 20.0 + of_all, **bare)
+    ours = SimpleNamespace(confined=0.0, total=1_000.0, chi2=np.full(20, 50.0), **bare)
+    theirs = SimpleNamespace(
+        confined=0.0, total=1_000.0 + worse, chi2=50.0 + worse / 20.0 + of_all, **bare
+    )
     both = Hypothesis((ROLLING, MOTOR), gain=64_000.0, score=63_990.0)
 
     def with_one_more(at, others, but):
@@ -1019,9 +1029,11 @@ def test_the_best_replacement_of_a_lone_effect_is_fitted(overstated, monkeypatch
     monkeypatch.setattr(rivals, "with_one_more", with_one_more)
     fit = {"at_bound": (), "variant": Variant(()), "chi2": np.full(20, 50.0)}
     looking.fit = lambda hypothesis, best=None: Tried(
-        hypothesis, SimpleNamespace(total=995.0, **fit)
+        hypothesis, SimpleNamespace(confined=0.0, total=995.0, **fit)
     )
-    (group,) = rivals.rivals_of(looking, Tried(chosen, SimpleNamespace(total=1_000.0, **fit)))
+    (group,) = rivals.rivals_of(
+        looking, Tried(chosen, SimpleNamespace(confined=0.0, total=1_000.0, **fit))
+    )
     assert [t.hypothesis for t in group] == [other]
     assert near == [overstated > 0.0]
 
@@ -1142,9 +1154,9 @@ def test_an_effect_of_a_whole_size_a_little_behind_is_grown_from_too(
 ):
     """A patch of the floor stood for wheels that shimmied and were toed, and nothing was named."""
     shimmy = hypothesis_of("relaxation_length", whole=True)
-    best = Tried(hypothesis_of("surface_patch"), SimpleNamespace(total=0.0))
-    other = Tried(hypothesis_of("toe"), SimpleNamespace(total=50.0))
-    whole = Tried(shimmy, SimpleNamespace(total=2000.0 - brings))
+    best = Tried(hypothesis_of("surface_patch"), SimpleNamespace(confined=0.0, total=0.0))
+    other = Tried(hypothesis_of("toe"), SimpleNamespace(confined=0.0, total=50.0))
+    whole = Tried(shimmy, SimpleNamespace(confined=0.0, total=2000.0 - brings))
     looking = SimpleNamespace(base=None, tried=[best, other, whole])
     monkeypatch.setattr(forward_selection, "gain", lambda _, fitted: 2000.0 - fitted.total)
     asked = []
@@ -1165,8 +1177,8 @@ def hypothesis_of(name, whole=False):
 def test_what_is_fitted_beside_several_effects_is_held_against_the_best_of_as_many(monkeypatch):
     """Beside two effects that were well fitted no single one seemed worth a second start."""
     tried = [
-        Tried(hypothesis_of("toe"), SimpleNamespace(total=1050.0)),
-        Tried(hypothesis_of("torque_gain"), SimpleNamespace(total=1040.0)),
+        Tried(hypothesis_of("toe"), SimpleNamespace(confined=0.0, total=1050.0)),
+        Tried(hypothesis_of("torque_gain"), SimpleNamespace(confined=0.0, total=1040.0)),
     ]
     asked = []
     looking = SimpleNamespace(tried=tried, fit=lambda _, best: asked.append(best))
@@ -1174,6 +1186,6 @@ def test_what_is_fitted_beside_several_effects_is_held_against_the_best_of_as_ma
     single = hypothesis_of("mass_offset")
     monkeypatch.setattr(probable, "_not_yet_fitted", lambda *_: [single, pair])
     monkeypatch.setattr(probable, "better_of", lambda *_: None)
-    several = SimpleNamespace(hypothesis=pair, fitted=SimpleNamespace(total=1000.0))
+    several = SimpleNamespace(hypothesis=pair, fitted=SimpleNamespace(confined=0.0, total=1000.0))
     probable.better_than(looking, several)
     assert asked == [tried[1], Tried(pair, several.fitted)]

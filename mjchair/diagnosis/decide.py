@@ -30,6 +30,7 @@ from mjchair.diagnosis.explain.left_out import (
     on_held_out,
     over_noise,
     slow_part,
+    with_spoken_against,
 )
 from mjchair.diagnosis.explain.one_run import InOneRun, in_one_run
 from mjchair.diagnosis.explain.probability import (
@@ -78,7 +79,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     """What the stages say together."""
     closed = closure(gap, base, choice.fitted, choice.after) if choice else 0.0
     probability = probabilities(base, choice)
-    choice = with_probable(choice, probability) if choice else None
+    choice = _with_rivals(base, choice, probability) if choice else None
     differing = uneven(base.bench, choice.fitted, choice.brought) if choice else []
     stands = standing(base, choice, closed, probability) if choice else None
     alone = in_one_run(base, gap, choice) if gap.exists else None
@@ -154,6 +155,11 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         evidence=evidence(base, named.fitted if named else None, plan, forces),
         stages=Stages(base=base, gap=gap, choice=choice),
     )
+
+
+def _with_rivals(base: Base, choice: Choice, probability: Mapping[str, float]) -> Choice:
+    """The choice with the rivals that only show once everything was fitted."""
+    return with_spoken_against(base, with_probable(choice, probability))
 
 
 def _tipped(base: Base) -> list[str]:

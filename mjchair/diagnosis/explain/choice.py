@@ -26,8 +26,12 @@ class Tried:
 
     @property
     def price(self) -> float:
-        """Chi2 with the penalty of the parameters, less for effects that are common."""
-        return self.fitted.total + self.hypothesis.penalty
+        """Chi2 with the penalty of the parameters, less for effects that are common.
+
+        And with what it costs that windows must begin so: a long relaxation that makes two casters
+        shimmy as in a mirror brakes as much as the data ask for, and no turn shows it.
+        """
+        return self.fitted.total + self.fitted.confined + self.hypothesis.penalty
 
 
 @dataclass(kw_only=True)

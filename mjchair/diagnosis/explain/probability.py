@@ -26,6 +26,7 @@ from mjchair.diagnosis.explain.gap import groups
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.screening import Base, gain, overstated
 from mjchair.diagnosis.fit.bounded import Reduced
+from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.replay.pulses import Force
 
 Array = NDArray[np.float64]
@@ -154,14 +155,21 @@ def weights(base: Base, choice: Choice | None) -> dict[str, Weight]:
 
 
 def _kept(base: Base, choice: Choice | None) -> dict[str, float]:
-    """Chi2 that the hypotheses gain which were fitted, each by the best of its fits."""
+    """Chi2 that the hypotheses gain which were fitted, each by the best of its fits.
+
+    Less what it costs that windows must begin as each of them needs it.
+    """
     if choice is None:
         return {}
+
+    def gained(fitted: Fitted) -> float:
+        return gain(base, fitted) - (fitted.confined - base.plain.confined)
+
     fits: dict[str, float] = {}
     for tried in choice.tried:
-        name, gained = tried.hypothesis.name, gain(base, tried.fitted)
-        fits[name] = max(fits.get(name, gained), gained)
-    fits[choice.hypothesis.name] = gain(base, choice.fitted)
+        name, own = tried.hypothesis.name, gained(tried.fitted)
+        fits[name] = max(fits.get(name, own), own)
+    fits[choice.hypothesis.name] = gained(choice.fitted)
     return fits
 
 

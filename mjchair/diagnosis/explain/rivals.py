@@ -60,8 +60,10 @@ def better_of(fits: Fits, chosen: Tried, rivals: Sequence[tuple[Tried, float]]) 
     def ahead(rival: Tried, own: float, anew: bool) -> float:
         """Chi2 by which a rival is better: as far as the form of effects lets the data count, and
         by how much more common it is."""
+        made = [fits.anew(t) if anew else t.fitted for t in (chosen, rival)]
         mine, theirs = (
-            (fits.anew(t) if anew else t.fitted).total + t.hypothesis.cost for t in (chosen, rival)
+            fitted.total + fitted.confined + t.hypothesis.cost
+            for t, fitted in zip((chosen, rival), made, strict=True)
         )
         more_common = rival.hypothesis.prior - chosen.hypothesis.prior
         return rules.counts(mine - theirs, gain=own) + more_common

@@ -67,6 +67,8 @@ class Fitted:
       at_bound: parameters that ended on a bound.
       at_least: parameter -> least size, where far larger ones fit as well.
       correlation: of two parameters of one effect.
+      confined: of the windows fitted to, `System.confined` together: what a chair costs, in chi2,
+        that fits only for few of the ways in which its windows may begin.
     """
 
     variant: Variant
@@ -82,6 +84,7 @@ class Fitted:
     at_bound: tuple[ParameterId, ...]
     at_least: dict[ParameterId, float] = field(default_factory=dict)
     correlation: dict[frozenset[ParameterId], float] = field(default_factory=dict)
+    confined: float = 0.0
 
     def std_of_difference(self, one: ParameterId, other: ParameterId) -> float:
         """Standard deviation of one parameter less another of the same effect, SI; 0: not fitted.
@@ -301,6 +304,7 @@ def _around(
         sigmas={t.effect.key: _sigmas(t, system, covariance) for t in variant.terms},
         at_bound=tuple(key for term in variant.terms for key in on_bound(term)),
         correlation=correlation,
+        confined=float(system.confined[bench.windows].sum()),
     )
 
 

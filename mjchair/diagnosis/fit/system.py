@@ -41,6 +41,7 @@ class System:
       G: (windows, p, p). b: (windows, p). c: (windows,) chi2 of the residual.
       run: (windows,) index of the run. back: (nuisance,) where the model already stands from the
         centre of its priors, in standard deviations.
+      confined: (windows,) how much narrower data make what each window is free in, as chi2.
       slow: slow components of the windows. cells: slow parts, with the best nuisances put in.
     """
 
@@ -52,6 +53,7 @@ class System:
     c: Array
     run: NDArray[np.int64]
     back: Array
+    confined: Array = field(default_factory=lambda: np.zeros(0))
     slow: list[list[Array]] = field(default_factory=list)
     cells: list[Cells] = field(default_factory=list)
 
@@ -118,6 +120,7 @@ def build(
     ids = list(columns)
     p, count = len(ids), len(simulator.windows)
     G, b, c = np.zeros((count, p, p)), np.zeros((count, p)), np.zeros(count)
+    confined = np.zeros(count)
     slow: list[list[Array]] = [[] for _ in simulator.windows]
     raw = np.zeros(p)
     for i, w in enumerate(simulator.windows):
@@ -127,6 +130,7 @@ def build(
         stacked = np.stack([columns[n][i] for n in ids], axis=2)
         window = eliminate_window(simulator, track, whitener, i, miss, stacked, process)
         G[i], b[i], c[i] = window.G, window.b, window.chi2
+        confined[i] = window.confined
         raw += (window.J * window.J).sum(axis=0)
         if only is None:
             slow[i] = slow_components(window, nuisance, whitener.slow(i, BAND))
@@ -142,6 +146,7 @@ def build(
         c=c,
         run=np.array([w.run for w in simulator.windows]),
         back=np.array([_offset(n, offsets) for n in ids[:nuisance]]),
+        confined=confined,
         slow=slow,
     )
     return system
