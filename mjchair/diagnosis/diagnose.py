@@ -81,7 +81,9 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"), without_engine_warnings():
         bench, first = prepare(known, say, store, threads)
         base = screen_columns(bench, first, study_effects(known, effects), say)
-        return conclude(*explained(without_hidden(Fits(base, say))))
+        found = explained(without_hidden(Fits(base, say)))
+        say("the verdict, and the experiment to do next")
+        return conclude(*found)
 
 
 def corrected(study: Study, diagnosis: Diagnosis) -> mujoco.MjSpec:

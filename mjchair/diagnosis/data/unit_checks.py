@@ -92,8 +92,11 @@ def check_first_speed(trial: Trial, axle: RearAxle, speed: float) -> None:
 
 def _refuse(trial: Trial, name: str, what: str, why: str, *units: str) -> NoReturn:
     headers = " or ".join(f"{name} [{unit}]" for unit in units)
-    header = f"; give SI, or the unit in its header, as in {headers}" if units else ""
-    raise MjchairError(f"{trial.name}: {name} looks like {what}: {why}{header or '; give SI'}")
+    header = f"as in {headers}" if units else "or name the channel that it is"
+    raise MjchairError(
+        f"{trial.name}: {name} looks like {what}: {why}; give {sensor(name).unit}, or its unit in "
+        f"its header, {header}"
+    )
 
 
 def _size(values: Array) -> float:
@@ -107,7 +110,7 @@ def _check_limits(trial: Trial, axle: RearAxle) -> None:
             continue
         limit, size = limit_of(name, kind.most, axle), _size(values)
         if size > limit:
-            why = f"it reaches {size:.3g}, and no chair passes {limit:.3g} in SI"
+            why = f"it reaches {size:.3g}, and no chair passes {limit:.3g} {kind.unit}"
             units = [kind.degrees] if kind.degrees else []
             if not units or size > DEGREES * limit:
                 _refuse(trial, name, "other units", why, *units)

@@ -187,6 +187,7 @@ class Fits:
         hypothesis, first = tried.hypothesis, tried.fitted
         known = _of(hypothesis, self.again)
         if known is None:
+            self.say(f"fit of {hypothesis.label}, with everything made anew around it")
 
             def note(why: str) -> None:
                 self._note(f"the fit of {hypothesis.label} was not made anew: {why}")

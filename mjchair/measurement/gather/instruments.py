@@ -35,7 +35,7 @@ COAST = 0.98  # share of a rolling recording without a hand, above which it is a
 CHAIR_SPEED = "chair_speed"  # m/s, a column of a rider's motion
 CHAIR_HEADING = "chair_heading"  # rad, in the laboratory, the same
 RIDER_COLUMNS = {*JOINT_NAMES, "rider_motion", CHAIR_SPEED, CHAIR_HEADING}
-RADIUS = 0.3  # m, of a rear wheel where nothing tells it: 24 inches
+RADIUS = 0.3  # m, of a rear wheel where nothing tells it: about 24 inches across, under load
 # words that tell a side to everybody
 FULL = {"left", "right", "leftwheel", "rightwheel", "gauche", "droite", "links", "rechts"}
 SEEN = 0.7  # share of the time below which it is said how little of the chair is seen

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from mjchair.measurement.gather.instruments import RIDER_COLUMNS
+from mjchair.measurement.gather.instruments import RADIUS, RIDER_COLUMNS
 from mjchair.measurement.gather.join import GatheredTrial
 from mjchair.measurement.gather.known import MODEL_CHAIR, Known
 from mjchair.rider.anatomy import JOINT_NAMES
@@ -120,7 +120,7 @@ def _radius(known: Known, radius: float | None) -> str:
         return _line(f"wheel_radius = {known.wheel_radius:g}", "m, of the rear wheels, as given")
     if radius is not None:
         return _line(f"wheel_radius = {radius:.3f}", "m, that the instrumented wheel was set to")
-    return _ask("wheel_radius", "0.3048", "radius of the rear wheels, m (--wheel-radius)")
+    return _ask("wheel_radius", f"{RADIUS:g}", "radius of the rear wheels, m (--wheel-radius)")
 
 
 def unit_of(channel: str) -> str:
