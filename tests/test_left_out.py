@@ -220,3 +220,5 @@ def test_an_effect_that_held_out_trials_speak_against_may_be_nothing(
     found = left_out.with_spoken_against("base", choice)
     assert asked == [("both", bare)]  # without the shimmy nothing was fitted
     assert found.rivals == [[], [known, fewer] if spoken_against else [known]]
+    twice = left_out.with_spoken_against("base", replace(choice, others=[fewer]))
+    assert twice.rivals == [[], [known]]  # it is a rival already

@@ -141,9 +141,10 @@ def with_spoken_against(base: Base, choice: Choice) -> Choice:
     """
     starts = choice.hypothesis.starts
     rivals = []
+    stand = [set(t.hypothesis.keys) for t in choice.others]  # they are rivals already
     for start, known in zip(starts, choice.rivals, strict=True):
-        others = set(choice.hypothesis.keys) - {start.effect.key}
-        fewer = [t for t in choice.tried if set(t.hypothesis.keys) == others]
+        rest = set(choice.hypothesis.keys) - {start.effect.key}
+        fewer = [t for t in choice.tried if set(t.hypothesis.keys) == rest and rest not in stand]
         best = min(fewer, key=attrgetter("price"), default=None)
         against = best is not None and _speaks_against(base, choice.fitted, best.fitted)
         rivals.append([*known, best] if best is not None and against else known)
