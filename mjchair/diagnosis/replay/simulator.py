@@ -37,7 +37,6 @@ Array = NDArray[np.float64]
 NO_BODY = ("mjMINVAL", "A + B >= C")  # MuJoCo's words for it
 FORCE = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
 STATE = ("qpos", "qvel", "act")
-PADDED = 0.1  # of its steps, by which a window is simulated further to go with others
 COURSE = (*STATE, "sensordata")  # all that another simulation needs to go on from any step
 
 
@@ -275,11 +274,11 @@ class WindowSimulator:
         outcomes: list[Outcome | None] = [None] * len(jobs)
         models = [job.model for job in jobs]
         apart = [(job.force is None, job.begin) for job in jobs]
-        steps = _alike([self.steps(job.model, job.window) for job in jobs])
+        steps = [self.steps(job.model, job.window) for job in jobs]
         record = tuple(dict.fromkeys(("sensordata", *trace)))
         for chunk in batch.groups(models, steps, record, apart):
             with installed():
-                done = self._chunk([jobs[i] for i in chunk], steps[chunk[0]], record, trace)
+                done = self._chunk([jobs[i] for i in chunk], record, trace)
             for i, outcome in zip(chunk, done, strict=True):
                 outcomes[i] = outcome
         return [o for o in outcomes if o is not None]
@@ -306,12 +305,11 @@ class WindowSimulator:
         steps = int(np.ceil((window.last - window.start) / self.step)) + 3
         return int(np.ceil(steps * self.step / model.opt.timestep)) + 1
 
-    def _chunk(
-        self, jobs: list[Job], steps: int, record: Sequence[str], trace: Sequence[str]
-    ) -> list[Outcome]:
-        """Jobs of one model size that begin at the same step, each simulated up to `steps`."""
+    def _chunk(self, jobs: list[Job], record: Sequence[str], trace: Sequence[str]) -> list[Outcome]:
+        """Jobs of one model size and as many steps, that begin at the same step."""
         models = [job.model for job in jobs]
         model, begin = models[0], jobs[0].begin
+        steps = self.steps(model, jobs[0].window)
         kept: dict[tuple[int, int, float, bytes], Array] = {}
         rows = []
         for job, m in zip(jobs, models, strict=True):
@@ -327,12 +325,11 @@ class WindowSimulator:
         out, _ = batch.roll(models, states, control, what=what, record=record, threads=self.threads)
         done = []
         for i, job in enumerate(jobs):
-            own = self.steps(model, job.window) - begin  # what comes after is not the window's
-            sensed = out["sensordata"][i, :own]
+            sensed = out["sensordata"][i]
             if job.sofar is not None:
                 sensed = np.concatenate([job.sofar.sensed, sensed])
             predicted = self._sampled(model, job.window, sensed)
-            done.append(Outcome(predicted, {k: out[k][i, :own] for k in trace}))
+            done.append(Outcome(predicted, {k: out[k][i] for k in trace}))
         return done
 
     def _states(self, jobs: list[Job], model: mujoco.MjModel) -> dict[str, Array]:
@@ -388,19 +385,6 @@ def _given(run: Run) -> Iterator[Part]:
         if sensor(name).wraps:
             yield name
             yield values
-
-
-def _alike(steps: Sequence[int]) -> list[int]:
-    """The steps of every job, those that are about as many made equal, so that they go together.
-
-    Windows of a few steps more or less would be as many batches, of too few jobs for all threads.
-    """
-    out, longest = list(steps), max(steps, default=0)
-    for i in sorted(range(len(out)), key=out.__getitem__, reverse=True):
-        if out[i] < (1.0 - PADDED) * longest:
-            longest = out[i]
-        out[i] = longest
-    return out
 
 
 def _resized(force: Array | None, steps: int) -> Array:
