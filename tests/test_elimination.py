@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from mjchair.diagnosis.fit import elimination
 from mjchair.diagnosis.replay.chair_state import SLOW
@@ -53,3 +54,21 @@ def test_a_study_says_how_far_its_sensors_drift(monkeypatch):
     known = simulator(1, {"drift:imu_accelerometer": 0.1, "drift:imu_gyro": 0.0})
     free, precision = elimination.state_columns(known, track, 0)
     assert free.shape[2] == len(SLOW) + 1 and precision[-1] == pytest.approx(0.1**-2)
+
+
+def test_what_confines_a_window_is_what_its_evidence_has_beside_chi2():
+    """-2 log p(r) of r = Z x + noise, with x beforehand of its prior and nothing eliminated."""
+    rng = np.random.default_rng(3)
+    Z, precision = rng.standard_normal((ROWS, 3)), np.array([4.0, 0.25, 1e-3])
+    r = rng.standard_normal(ROWS)
+    window = elimination.eliminate(r, r[:, None], Z, precision)
+    whole = np.eye(ROWS) + Z @ np.diag(1.0 / precision) @ Z.T
+    expected = -2.0 * stats.multivariate_normal(cov=whole).logpdf(r) - ROWS * np.log(2.0 * np.pi)
+    assert window.chi2 + window.confined == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_window_of_which_the_data_tell_nothing_is_confined_by_nothing():
+    nothing = np.zeros((ROWS, 2))
+    one = np.ones(ROWS)
+    window = elimination.eliminate(one, one[:, None], nothing, np.array([4.0, 0.25]))
+    assert window.confined == pytest.approx(0.0, abs=1e-12)

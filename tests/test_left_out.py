@@ -8,11 +8,8 @@ import pytest
 from noisy_run import NOISE, noisy_run
 
 import mjchair
-from mjchair.diagnosis import rules
 from mjchair.diagnosis.data.study import make_study
 from mjchair.diagnosis.explain import left_out
-from mjchair.diagnosis.explain.choice import Choice, Tried
-from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.left_out import held_out
 from mjchair.diagnosis.explain.screening import prepare, screen_columns
 from mjchair.diagnosis.fit import bounded
@@ -97,6 +94,13 @@ def base():
     study = make_study(spec, [kept, replace(other, hold_out=True)], NOISE)
     bench, first = prepare(study, threads=1)
     return screen_columns(bench, first, [])
+
+
+def test_how_a_held_out_run_begins_costs_a_fit_nothing(base):
+    plain, held = base.plain, left_out.held_windows(base)
+    assert (plain.system.confined > 1.0).all()
+    rest = plain.system.confined.sum() - plain.system.confined[held].sum()
+    assert plain.confined == pytest.approx(rest)
 
 
 def told_otherwise(base, by):
@@ -197,28 +201,3 @@ def test_a_held_out_run_that_alone_shows_what_is_missing_is_told(monkeypatch):
         found = left_out.lone_run(base, fitted)
         assert found == said
     assert "Hold out another run than turn" in wording.letting_in("turn", 7.0, 2.0)
-
-
-@pytest.mark.parametrize(("after", "spoken_against"), [(490.0, True), (60.0, False)])
-def test_an_effect_that_held_out_trials_speak_against_may_be_nothing(
-    after, spoken_against, monkeypatch
-):
-    """Casters that shimmied took torques 8 and 12 % too low for themselves, and both were named."""
-    drive, shimmy = (SimpleNamespace(effect=SimpleNamespace(key=k)) for k in ("drive", "shimmy"))
-    both, alone = (Hypothesis(s, 0.0, 0.0) for s in ((shimmy, drive), (shimmy,)))
-    bare = SimpleNamespace(total=900.0, confined=0.0)
-    fewer = Tried(alone, bare)
-    known = Tried(Hypothesis((drive,), 0.0, 0.0), bare)
-    choice = Choice(
-        hypothesis=both, fitted="both", after=None, rivals=[[], [known]], own_gains=[1.0, 1.0],
-        tried=[fewer, Tried(both, bare)],
-    )  # fmt: skip
-    held = rules.HeldOut(before=500.0, after=after, dof=50.0, changed=400.0)
-    asked = []
-    monkeypatch.setattr(left_out, "on_held_out", lambda *a: asked.append(a[1:]) or held)
-    monkeypatch.setattr(Hypothesis, "penalty", 0.0)
-    found = left_out.with_spoken_against("base", choice)
-    assert asked == [("both", bare)]  # without the shimmy nothing was fitted
-    assert found.rivals == [[], [known, fewer] if spoken_against else [known]]
-    twice = left_out.with_spoken_against("base", replace(choice, others=[fewer]))
-    assert twice.rivals == [[], [known]]  # it is a rival already

@@ -107,6 +107,18 @@ def test_a_choice_counts_though_another_fit_of_it_ended_where_it_is_not_there(fi
     assert probabilities(made, choice) == pytest.approx(sure)
 
 
+def test_a_fit_for_few_beginnings_of_its_windows_has_less_evidence():
+    """As much less as it costs beyond the chair without effects, in chi2."""
+    known = base(6.0)
+    choice = chosen(known, "rolling_resistance")
+    before = probability._kept(known, choice)
+    known.plain.confined, choice.fitted.confined = 5.0, 45.0
+    after = probability._kept(known, choice)
+    name = "rolling_resistance"
+    assert before[name] - after[name] == pytest.approx(40.0)
+    assert after["caster_trail"] - before["caster_trail"] == pytest.approx(5.0)
+
+
 def test_a_hypothesis_whose_only_fit_ended_where_it_is_not_there_has_no_part(monkeypatch):
     made = base(2.0, alike=0.9)
     choice = chosen(made, "rolling_resistance")

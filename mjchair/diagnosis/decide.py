@@ -30,7 +30,6 @@ from mjchair.diagnosis.explain.left_out import (
     on_held_out,
     over_noise,
     slow_part,
-    with_spoken_against,
 )
 from mjchair.diagnosis.explain.one_run import InOneRun, in_one_run
 from mjchair.diagnosis.explain.probability import (
@@ -41,7 +40,7 @@ from mjchair.diagnosis.explain.probability import (
     with_gap,
     with_one_run,
 )
-from mjchair.diagnosis.explain.rivals import exchanged, with_probable
+from mjchair.diagnosis.explain.rivals import exchanged, with_probable, with_spoken_against
 from mjchair.diagnosis.explain.run_by_run import uneven
 from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit import bounded
@@ -79,7 +78,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     """What the stages say together."""
     closed = closure(gap, base, choice.fitted, choice.after) if choice else 0.0
     probability = probabilities(base, choice)
-    choice = _with_rivals(base, choice, probability) if choice else None
+    choice = with_spoken_against(base, with_probable(choice, probability)) if choice else None
     differing = uneven(base.bench, choice.fitted, choice.brought) if choice else []
     stands = standing(base, choice, closed, probability) if choice else None
     alone = in_one_run(base, gap, choice) if gap.exists else None
@@ -155,11 +154,6 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         evidence=evidence(base, named.fitted if named else None, plan, forces),
         stages=Stages(base=base, gap=gap, choice=choice),
     )
-
-
-def _with_rivals(base: Base, choice: Choice, probability: Mapping[str, float]) -> Choice:
-    """The choice with the rivals that only show once everything was fitted."""
-    return with_spoken_against(base, with_probable(choice, probability))
 
 
 def _tipped(base: Base) -> list[str]:

@@ -32,6 +32,6 @@ def check_torques(controls: Mapping[str, Array], source: str) -> None:
         if size > TORQUE:
             raise MjchairError(
                 f"{source}: {name} looks like N mm: it reaches {size:.4g}, and neither hand nor "
-                f"motor passes {TORQUE:g} N m; give SI, or the unit in its header, as in "
+                f"motor passes {TORQUE:g} N m; give N m, or the unit in its header, as in "
                 f"{name} [N mm] or {name} [N cm]"
             )

@@ -92,10 +92,10 @@ def check_first_speed(trial: Trial, axle: RearAxle, speed: float) -> None:
 
 def _refuse(trial: Trial, name: str, what: str, why: str, *units: str) -> NoReturn:
     headers = " or ".join(f"{name} [{unit}]" for unit in units)
-    header = f"as in {headers}" if units else "or name the channel that it is"
+    header = f", as in {headers}" if units else "; if it is another channel, name it so"
     raise MjchairError(
-        f"{trial.name}: {name} looks like {what}: {why}; give {sensor(name).unit}, or its unit in "
-        f"its header, {header}"
+        f"{trial.name}: {name} looks like {what}: {why}; give {sensor(name).unit}, or the unit in "
+        f"its header{header}"
     )
 
 

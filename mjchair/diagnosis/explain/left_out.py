@@ -8,14 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain.choice import Choice
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.null_ensemble import confirmed
 from mjchair.diagnosis.explain.screening import Base, gap_after, reaches
@@ -132,27 +130,8 @@ def on_held_out(base: Base, fitted: Fitted, fewer: Fitted | None = None) -> rule
     return rules.HeldOut(before=before, after=after, dof=dof, changed=changed)
 
 
-def with_spoken_against(base: Base, choice: Choice) -> Choice:
-    """The choice with nothing as a rival of an effect that held-out trials speak against.
-
-    Beside casters that shimmied, torques 8 and 12 % too low came in at 280 of chi2: how each window
-    begins decides such a motion, and a fit may follow it with what is not there. What is there
-    shows in trials that no fit has seen.
-    """
-    starts = choice.hypothesis.starts
-    rivals = []
-    stand = [set(t.hypothesis.keys) for t in choice.others]  # they are rivals already
-    for start, known in zip(starts, choice.rivals, strict=True):
-        rest = set(choice.hypothesis.keys) - {start.effect.key}
-        fewer = [t for t in choice.tried if set(t.hypothesis.keys) == rest and rest not in stand]
-        best = min(fewer, key=attrgetter("price"), default=None)
-        against = best is not None and _speaks_against(base, choice.fitted, best.fitted)
-        rivals.append([*known, best] if best is not None and against else known)
-    return replace(choice, rivals=rivals)
-
-
-def _speaks_against(base: Base, fitted: Fitted, fewer: Fitted) -> bool:
-    """Whether held-out trials speak against what a fit has beyond one of fewer effects."""
+def speaks_against(base: Base, fitted: Fitted, fewer: Fitted) -> bool:
+    """Whether held-out trials, if there are any, speak against what a fit has beyond another."""
     held = on_held_out(base, fitted, fewer)
     return held is not None and not rules.carries_over(held)
 
