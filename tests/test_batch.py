@@ -1,10 +1,17 @@
 """Many simulations at once are what each would be alone."""
 
+import copy
+import ctypes
+from contextlib import ExitStack
+
 import mujoco
 import numpy as np
+import pytest
 from conftest import roll, slalom
 
 import mjchair
+from mjchair.diagnosis.replay.simulator import NEEDLESS
+from mjchair.engine import layout, step_timers
 from mjchair.simulation import batch
 
 
@@ -50,3 +57,43 @@ def test_groups_keep_sizes_steps_and_kinds_apart_and_fit_memory(manual, monkeypa
     assert found("aaaab") == [[0, 2], [1], [3], [4]]
     monkeypatch.setattr(batch, "BYTES", 2 * 8 * 100 * manual.nsensordata)
     assert found() == [[0, 2], [4], [1], [3]]
+
+
+def clock():
+    return ctypes.c_void_p.from_address(layout.address("mjcb_time")).value
+
+
+def test_the_timers_of_a_step_come_back_after_the_last_block(manual):
+    before = clock()
+    assert before
+    first, second = ExitStack(), ExitStack()
+    first.enter_context(step_timers.stopped())
+    second.enter_context(step_timers.stopped())
+    first.close()
+    assert clock() is None  # as of another thread that is still at it
+    second.close()
+    assert clock() == before
+    with pytest.raises(ValueError), step_timers.stopped():
+        raise ValueError
+    assert clock() == before
+    mjchair.install()
+    batch.roll([manual], {"qvel": np.zeros((1, manual.nv))}, np.zeros((1, 2, manual.nu)))
+    assert clock() == before
+
+
+@pytest.mark.parametrize("chair", ["manual", "power"])
+@pytest.mark.parametrize("thrown", [False, True])
+def test_what_a_diagnosis_switches_off_changes_no_bit(chair, thrown):
+    """Also of a chair that falls on its side, whose frame then touches the floor."""
+    mjchair.install()
+    model = mjchair.load_spec(chair).compile()
+    light = copy.copy(model)
+    light.opt.disableflags |= NEEDLESS
+    control = np.zeros((600, model.nu)) if thrown else slalom(model, 600)
+    datas = [mujoco.MjData(m) for m in (model, light)]
+    for data in datas:
+        data.qvel[3] = 4.0 if thrown else 0.0
+    one, other = (roll(m, control, d) for m, d in zip((model, light), datas, strict=True))
+    assert np.array_equal(one, other)
+    upright = datas[0].xmat[1].reshape(3, 3)[2, 2]
+    assert (upright < 0.5) == thrown

@@ -16,6 +16,8 @@ import numpy as np
 from mujoco import batch
 from numpy.typing import NDArray
 
+from mjchair.engine import step_timers
+
 Array = NDArray[np.float64]
 
 BYTES = 120_000_000  # largest size of the records of one batch
@@ -75,5 +77,6 @@ def roll(
     many.set_models(list(models))
     for name, values in states.items():
         (many.state if name == "state" else many.bind(name))[:] = values
-    records = many.rollout(inputs.shape[1], inputs, what, record=record)
+    with step_timers.stopped():
+        records = many.rollout(inputs.shape[1], inputs, what, record=record)
     return records, many.warning.reshape(len(models), -1).any(axis=1)
