@@ -40,7 +40,7 @@ def test_an_effect_that_linear_algebra_makes_far_too_large_begins_smaller(
     def around(bench, here, nuisances, known=None):
         return SimpleNamespace(variant=here.variant, total=here.total, promised=here.total)
 
-    monkeypatch.setattr(nonlinear, "_placed", placed)
+    monkeypatch.setattr(nonlinear, "placed", placed)
     monkeypatch.setattr(nonlinear, "_around", around)
     monkeypatch.setattr(nonlinear, "_after_linear_step", lambda bench, fitted: fitted.variant)
     start = Variant((), terms=(Term(TRAIL, {"length": 1.0}, ("length",)),))

@@ -55,7 +55,7 @@ def told(sizes, free, promised):
 def stuck(monkeypatch):
     """With both sizes free a fit stays where it began; with one held the other is fitted."""
 
-    def refit(bench, start, before, nuisances=None, rounds=12):
+    def refit(bench, start, before, nuisances=None, reach=np.inf):
         (term,) = start.terms
         sizes = np.array([term.values[name] for name in NAMES])
         if len(term.free) == 1:
@@ -142,7 +142,7 @@ def test_a_number_that_is_no_size_is_known_no_better_than_what_makes_up_for_it()
 
 
 def test_where_no_chair_is_beside_it_a_fit_stays(monkeypatch):
-    def never(*_):
+    def never(*_, **__):
         raise MjchairError("no chair")
 
     monkeypatch.setattr(multistart, "refit", never)

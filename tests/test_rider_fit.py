@@ -137,7 +137,7 @@ def test_the_chi2_of_a_variant_is_that_of_its_linear_system(push):
     bench, first, moving = push
     variant = replace(moving(60.0), offsets={"mass": 0.5, "centre_x": -1.0})
     known = nuisance_columns(bench, first, variant)
-    here = nonlinear._placed(bench, variant, first, known)
+    here = nonlinear.placed(bench, variant, first, known)
     end = nonlinear._around(bench, here, known)
     outside = end.system.index(nonlinear._outside(bench, known))
     total = bounded.solve_nuisances(end.system, bench.windows, outside)[1]
@@ -148,7 +148,7 @@ def test_no_columns_are_made_of_steps_that_fail(push, monkeypatch):
     """A body that moves 55 kg, and steps that are all made to fit worse than it."""
     bench, first, moving = push
     known = nuisance_columns(bench, first, moving(55.0))
-    placed, made, tried = nonlinear._placed, [], []
+    placed, made, tried = nonlinear.placed, [], []
 
     def worse(*args):
         tried.append(args[1].terms[0].values["mass"])
@@ -159,7 +159,7 @@ def test_no_columns_are_made_of_steps_that_fail(push, monkeypatch):
         made.append(args[2].terms[0].values["mass"])
         return term_columns(*args)
 
-    monkeypatch.setattr(nonlinear, "_placed", worse)
+    monkeypatch.setattr(nonlinear, "placed", worse)
     monkeypatch.setattr(nonlinear, "term_columns", columns)
     end = nonlinear.refit(bench, moving(55.0), first, known)
     assert end.variant.terms[0].values["mass"] == 55.0

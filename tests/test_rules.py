@@ -489,3 +489,11 @@ def test_what_leaves_a_number_on_its_wall_is_not_named_alone():
     """What pushes the number there may be all that is missing."""
     assert rules.verdict(True, CLEAR) == Verdict.NAMED
     assert rules.verdict(True, replace(CLEAR, walls=1)) == Verdict.AMBIGUOUS
+
+
+def test_a_whole_size_is_followed_as_far_as_it_may_be_the_best_beside_another():
+    assert rules.reach_of_whole(best=1000.0, gain=100.0) == rules.reach(best=1000.0, gain=100.0)
+    reach = rules.reach_of_whole(best=1000.0, gain=5000.0)
+    brings = 6000.0 - reach
+    assert rules.is_just_behind(gain=brings + 1.0, best=5000.0)
+    assert not rules.is_just_behind(gain=brings - 1.0, best=5000.0)

@@ -35,7 +35,7 @@ from mjchair.diagnosis.explain import fits as fits_of_hypotheses
 from mjchair.diagnosis.explain.choice import Choice, Tried
 from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
-from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit import bounded, nonlinear
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.effects import air_drag, wind
@@ -81,7 +81,7 @@ def fits(monkeypatch):
         start,
         before,
         nuisances=None,
-        rounds=multistart.ROUNDS,
+        rounds=nonlinear.ROUNDS,
         part=None,
         reach=np.inf,
         nothing=np.inf,
@@ -107,6 +107,7 @@ def fits(monkeypatch):
     monkeypatch.setattr(open_ended, "with_least_sizes", lambda _, fitted: fitted)
     monkeypatch.setattr(fits_of_hypotheses, "with_form_errors", lambda fitted: fitted)
     monkeypatch.setattr(multistart, "refit", refit)
+    monkeypatch.setattr(multistart, "placed", refit)
     monkeypatch.setattr(hypotheses, "terms", terms)
     return found
 
@@ -167,11 +168,11 @@ def test_more_effects_are_to_fit_better_than_the_best_part_of_them(fits, monkeyp
     """A hypothesis without one of these effects may fit worse."""
     asked = {}
 
-    def refit(bench, start, before, nuisances, rounds, part, reach, nothing):
+    def refit(bench, start, before, nuisances, part, reach, nothing):
         asked["+".join(sorted(t.effect.key for t in start.terms))] = part and part.total
         return fit(1400.0)
 
-    def refit_near(starts, rounds, part, reach):
+    def refit_near(starts, part, reach):
         asked["+".join(sorted(s.effect.key for s in starts))] = part and part.total
         return fit(1400.0)
 
@@ -639,7 +640,7 @@ def test_a_second_effect_is_weighed_around_the_fit_of_the_first(fits, monkeypatc
         }
     )
     both = fit(1110.0, "rolling", "motor")
-    near = SimpleNamespace(refit=lambda starts, rounds, most, reach: both, weigh=lambda starts: ONE)
+    near = SimpleNamespace(refit=lambda starts, most, reach: both, weigh=lambda starts: ONE)
     monkeypatch.setattr(fits_of_hypotheses, "near_fit", lambda base, found: near)
     monkeypatch.setattr(hypotheses, "singles", lambda *_: [ONE])
     monkeypatch.setattr(hypotheses, "pairs", lambda *_: [])
@@ -1088,13 +1089,47 @@ def test_a_fit_begins_from_afar_only_where_the_near_one_is_stuck(
         begun.append(self.near)
         return fit(total, promised=promised) if self.near else fit(1200.0)
 
-    monkeypatch.setattr(multistart.MultiStart, "_from", begin)
+    monkeypatch.setattr(multistart.MultiStart, "_begun", begin)
+    monkeypatch.setattr(multistart.MultiStart, "_followed", lambda _, fitted: fitted)
     starts = multistart.MultiStart(
         base=searching().base, hypothesis=BOTH, near="near", part=fit(1500.0), best=None,
         behind=0.0, note=print,
     )  # fmt: skip
     assert starts.fit().total == (1200.0 if afar else total)
     assert begun == (["near", None] if afar else ["near"])
+
+
+@pytest.mark.parametrize(("second", "followed"), [(1300.05, 1), (1290.0, 2)])
+def test_a_second_start_that_ends_where_the_first_did_is_not_followed(
+    monkeypatch, second, followed
+):
+    ends = {1.0: fit(1300.0, "rolling"), 0.5: fit(second, "rolling")}
+    seen = []
+    kind = multistart.MultiStart
+    monkeypatch.setattr(kind, "_begun", lambda _, share: ends[share])
+    monkeypatch.setattr(kind, "_best_share", lambda _: 0.5)
+    monkeypatch.setattr(kind, "_followed", lambda _, fitted: seen.append(fitted) or fitted)
+    one = Hypothesis((ROLLING,), gain=900.0, score=890.0)
+    starts = multistart.MultiStart(
+        base=searching().base, hypothesis=one, near=None, part=None, best=None, behind=0.0,
+        note=print,
+    )  # fmt: skip
+    assert starts.fit().total == min(1300.0, 1300.0 if followed == 1 else second)
+    assert len(seen) == followed
+
+
+def test_ends_are_alike_within_a_tenth_of_a_standard_error():
+    term = Term(air_drag.EFFECT, {"drag_area": 0.5}, ("drag_area",))
+    ((key, _),) = term.parameters
+
+    def end(size, moved=0.0):
+        variant = Variant((), offsets={"mass": moved}, terms=(replace(term, values=size),))
+        return SimpleNamespace(total=1000.0, variant=variant, std={key: 0.1})
+
+    one = end({"drag_area": 0.5})
+    assert multistart._end_alike(one, end({"drag_area": 0.509}))
+    assert not multistart._end_alike(one, end({"drag_area": 0.511}))
+    assert not multistart._end_alike(one, end({"drag_area": 0.5}, moved=0.11))
 
 
 @pytest.mark.parametrize(

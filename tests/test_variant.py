@@ -121,7 +121,7 @@ def descent(monkeypatch):
         total = float(next(totals))
         return SimpleNamespace(total=total, promised=500.0, track=None, std={}, variant=None)
 
-    monkeypatch.setattr(nonlinear, "_placed", placed)
+    monkeypatch.setattr(nonlinear, "placed", placed)
     monkeypatch.setattr(nonlinear, "_around", lambda _, here, *__: here)
     monkeypatch.setattr(nonlinear, "_after_linear_step", lambda *_: None)
     monkeypatch.setattr(nonlinear, "_between", lambda *_: None)
@@ -159,7 +159,7 @@ def test_a_start_that_fits_worse_than_a_part_of_its_effects_is_moved_towards_it(
         total = 1e6 if less > 0.2 else 100.0 - 50.0 * less
         return SimpleNamespace(total=total, promised=total, track=None, std={}, variant=variant)
 
-    monkeypatch.setattr(nonlinear, "_placed", placed)
+    monkeypatch.setattr(nonlinear, "placed", placed)
     monkeypatch.setattr(nonlinear, "_around", lambda _, here, *__: here)
     monkeypatch.setattr(nonlinear, "_after_linear_step", lambda _, best: best.variant)
     start = Variant(
@@ -191,7 +191,7 @@ def test_after_a_short_step_the_next_is_twice_as_long_and_not_whole(monkeypatch)
         return SimpleNamespace(total=total, promised=100.0, track=None, std={}, variant=variant)
 
     best = [0.0]
-    monkeypatch.setattr(nonlinear, "_placed", placed)
+    monkeypatch.setattr(nonlinear, "placed", placed)
     monkeypatch.setattr(nonlinear, "_around", lambda _, here, *__: here)
     monkeypatch.setattr(
         nonlinear, "_after_linear_step", lambda *_: Variant((), offsets={"mass": aim})
@@ -214,7 +214,7 @@ def test_a_better_place_beside_which_no_chair_can_be_is_a_step_that_failed(monke
             raise MjchairError("no chair")
         return start
 
-    monkeypatch.setattr(nonlinear, "_placed", placed)
+    monkeypatch.setattr(nonlinear, "placed", placed)
     monkeypatch.setattr(nonlinear, "_around", around)
     monkeypatch.setattr(nonlinear, "_after_linear_step", lambda *_: None)
     monkeypatch.setattr(nonlinear, "_between", lambda *_: None)

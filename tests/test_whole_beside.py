@@ -42,10 +42,11 @@ def base(monkeypatch):
     monkeypatch.setattr(
         whole_sizes, "track_of", lambda _, variant, __: variant.terms[0].values["moment"]
     )
-    monkeypatch.setattr(whole_sizes, "fit_from", lambda _, begin, __: begin)
+    monkeypatch.setattr(whole_sizes, "fit_from", lambda _, begin, *__: begin)
     return SimpleNamespace(
         bench=SimpleNamespace(system=system, windows=np.arange(1)),
         around=SimpleNamespace(variant=Variant(()), track=0.0),
+        plain=SimpleNamespace(total=0.0),
         nuisances={},
         columns=dict.fromkeys([*RESISTANCE.columns, *SCRUB.columns]),
         starts=[RESISTANCE, SCRUB],
@@ -56,7 +57,9 @@ def begun(base, monkeypatch, best):
     """Where fits begin, beside a best explanation that leaves this chi2."""
     monkeypatch.setattr(whole_sizes, "chi2", lambda *_: best)
     single = SimpleNamespace(chi2=np.ones(1))
-    return list(whole_beside.fits(base, single, SimpleNamespace(variant=None, track=None)))
+    return list(
+        whole_beside.fits(base, single, SimpleNamespace(variant=None, track=None, total=0.0))
+    )
 
 
 def test_a_moment_that_shows_beside_a_rolling_resistance_is_found(base, monkeypatch):

@@ -142,7 +142,7 @@ def test_a_size_is_known_no_better_than_fits_that_began_beside_it_say(monkeypatc
     chosen = ended(0.100, 3020.0)
     begun_at = []
 
-    def refit(bench, begin, track):
+    def refit(bench, begin, track, reach):
         begun_at.append(begin.terms[0].values["length"])
         return ended(*ends[len(begun_at) - 1])
 

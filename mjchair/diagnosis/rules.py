@@ -622,6 +622,15 @@ def reach(*, best: float, gain: float) -> float:
     return best + FAR_BEHIND * not_ruled_out(gain=gain)
 
 
+def reach_of_whole(*, best: float, gain: float) -> float:
+    """As `reach`, of an effect of a whole size: beside another it may be the best.
+
+    Args:
+      best: chi2 of the best fit. gain: that it brings.
+    """
+    return max(reach(best=best, gain=gain), best + LINEAR * gain)
+
+
 def not_ruled_out(*, gain: float) -> float:
     """Chi2 by which a fit may be worse and yet as good as another that brings `gain`."""
     return max(RIVAL_CHI2, FORM * gain)

@@ -19,7 +19,7 @@ from mjchair.diagnosis.explain.near_fit import NearFit
 from mjchair.diagnosis.explain.screening import Base, Say, gain, goes_far, silent
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ColumnId
-from mjchair.diagnosis.fit.nonlinear import ROUNDS, Fitted, refit
+from mjchair.diagnosis.fit.nonlinear import Fitted, placed, refit
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.window_states import Track
@@ -27,6 +27,7 @@ from mjchair.errors import MjchairError
 
 SHARES = (0.875, 0.75, 0.625, 0.5, 0.375, 0.25, 0.125)  # of linear coefficients, for a new start
 ANEW = 3  # times that a fit which goes far begins again where it ended, as long as that brings much
+ALIKE = 0.1  # of chi2, and of standard deviations, by which two ends are one
 SMALLER = 0.1  # of an effect, where a fit begins once more that went astray
 
 
@@ -61,7 +62,8 @@ class MultiStart:
         The second is the best place on the line from no effect to what linear algebra promises: a
         tire with a quarter of its friction slides where one with a third of it does not.
         """
-        first = self._from(1.0)
+        begun = self._begun(1.0)
+        first = self._followed(begun)
         if self.near is not None:
             return self._or_from_afar(first)
         many = len(self.hypothesis.starts) > 1 and self.best is not None  # one start is enough
@@ -71,7 +73,10 @@ class MultiStart:
         if first is not None and (many or not short or self._is_hopeless(first)):
             return first
         share = self._best_share()
-        second = None if share is None else self._from(share)
+        other = None if share is None else self._begun(share)
+        if begun is not None and other is not None and _end_alike(begun, other):
+            return first
+        second = self._followed(other)
         fits = [f for f in (first, second) if f is not None]
         if len(fits) > 1 and rules.starts_disagree(fits[0].total, fits[1].total):
             ends = " and ".join(f"{f.total:.0f}" for f in fits)
@@ -90,8 +95,8 @@ class MultiStart:
             better = self.part is not None and self.part.total - near.total > rules.WORTH
             if better or not rules.is_stuck(total=near.total, promised=near.promised):
                 return near
-        afar = replace(self, near=None)._from(1.0)
-        return _better(near, afar)
+        afar = replace(self, near=None)
+        return _better(near, afar._followed(afar._begun(1.0)))
 
     def _or_beside_part(self, fitted: Fitted | None) -> Fitted | None:
         """The fit, or a better one that begins where a part of the hypothesis was fitted.
@@ -138,7 +143,7 @@ class MultiStart:
                 continue
             known.append(self._values(share))
             try:
-                totals[share] = self._refit(share, rounds=0).total
+                totals[share] = self._chi2_at(share)
             except (MjchairError, np.linalg.LinAlgError):
                 continue
         return min(totals, key=totals.__getitem__, default=None)
@@ -147,23 +152,29 @@ class MultiStart:
         """The effects' parameters at a share of the linear fit's coefficients."""
         return [t.values for t in hypotheses.terms(self.base.reduced, self.hypothesis, share)]
 
-    def _from(self, share: float) -> Fitted | None:
-        """The fit that begins at a share of the linear fit's coefficients; None: none can be."""
+    def _begun(self, share: float) -> Fitted | None:
+        """The fit that begins at a share of the linear fit's coefficients; None: none can be.
+
+        Its columns of what is roughly known are those of the start.
+        """
         try:
-            fitted = self._refit(share)
+            return self._refit(share)
         except (MjchairError, np.linalg.LinAlgError) as error:
             why = str(error).partition(";")[0]  # what a user would do about it is no use here
             self.note(f"a start of the fit of {self.hypothesis.label} was left out: {why}")
             return None
-        if self._is_behind(fitted):
-            pass  # what it would gain if all were made anew decides nothing
-        elif goes_far(fitted):
-            fitted = self._around_terms(fitted)
-        elif rules.is_stuck(total=fitted.total, promised=fitted.promised):
-            fitted = made_anew(self.base.bench, fitted.variant, fitted.track) or fitted
+
+    def _followed(self, fitted: Fitted | None) -> Fitted | None:
+        """A fit that was begun, with everything made anew where that may bring something."""
+        if fitted is None or self._is_behind(fitted):
+            return fitted  # what it would gain if all were made anew decides nothing
+        if goes_far(fitted):
+            return self._around_terms(fitted)
+        if rules.is_stuck(total=fitted.total, promised=fitted.promised):
+            return made_anew(self.base.bench, fitted.variant, fitted.track) or fitted
         return fitted
 
-    def _refit(self, share: float, rounds: int = ROUNDS) -> Fitted:
+    def _refit(self, share: float) -> Fitted:
         """The nonlinear fit that begins at a share of the linear fit's coefficients.
 
         Raises:
@@ -171,20 +182,30 @@ class MultiStart:
         """
         base, reach = self.base, self._reach()
         if self.near is not None:
-            return self.near.refit(self.hypothesis.starts, rounds, self.part, reach)
-        terms = hypotheses.terms(base.reduced, self.hypothesis, share)
-        start = replace(base.around.variant, terms=terms)
-        nothing = base.reduced.total if rounds else np.inf  # else the start itself is asked for
+            return self.near.refit(self.hypothesis.starts, self.part, reach)
         return refit(
             base.bench,
-            start,
+            self._at(share),
             base.around.track,
             base.nuisances,
-            rounds,
-            self.part,
-            reach,
-            nothing,
+            part=self.part,
+            reach=reach,
+            nothing=base.reduced.total,
         )
+
+    def _chi2_at(self, share: float) -> float:
+        """Chi2 at a share of the linear fit's coefficients, as it stands.
+
+        Raises:
+          MjchairError: there no chair can be.
+        """
+        base = self.base
+        return placed(base.bench, self._at(share), base.around.track, base.nuisances).total
+
+    def _at(self, share: float) -> Variant:
+        """The chair with the effects at a share of the linear fit's coefficients."""
+        terms = hypotheses.terms(self.base.reduced, self.hypothesis, share)
+        return replace(self.base.around.variant, terms=terms)
 
     def _terms(self) -> tuple[Term, ...]:
         """The effects with the values that linear algebra promises."""
@@ -233,7 +254,7 @@ class MultiStart:
         """
         start = replace(fitted.variant, offsets={})
         for _ in range(ANEW):
-            again = made_anew(self.base.bench, start, fitted.track)
+            again = made_anew(self.base.bench, start, fitted.track, reach=self._reach())
             if again is None or fitted.total - again.total < rules.WORTH:
                 return _better(fitted, again) or fitted
             fitted, start = again, again.variant
@@ -248,18 +269,36 @@ def made_anew(
     before: Track,
     columns: dict[ColumnId, Column] | None = None,
     note: Say = silent,
+    reach: float = np.inf,
 ) -> Fitted | None:
     """The fit from a variant, all columns made there; None: no chair can be so.
 
     Args:
       columns: of what is roughly known, to be used instead; None: they are made there too.
       note: is called with the reason where no chair can be so.
+      reach: chi2; a fit that promises more after a round ends there.
     """
     try:
-        return refit(bench, start, before, columns)
+        return refit(bench, start, before, columns, reach=reach)
     except (MjchairError, np.linalg.LinAlgError) as error:
         note(str(error))
         return None
+
+
+def _end_alike(one: Fitted, other: Fitted) -> bool:
+    """Whether two fits of the same effects end in the same place.
+
+    What is made anew around one of them is then made around the other as well.
+    """
+    sizes = zip(one.variant.terms, other.variant.terms, strict=True)
+    apart = [
+        abs(a.values[p.name] - b.values[p.name]) / max(one.std[key], 1e-300)
+        for a, b in sizes
+        for key, p in a.parameters
+    ]
+    theirs = other.variant.offsets
+    apart += [abs(by - theirs.get(name, 0.0)) for name, by in one.variant.offsets.items()]
+    return abs(one.total - other.total) < ALIKE and max(apart, default=0.0) < ALIKE
 
 
 def _better(*fits: Fitted | None) -> Fitted | None:

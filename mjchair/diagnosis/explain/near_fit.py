@@ -57,14 +57,12 @@ class NearFit:
             at += count
         return tuple(out)
 
-    def refit(
-        self, starts: Sequence[Start], rounds: int, part: Fitted | None, reach: float
-    ) -> Fitted:
+    def refit(self, starts: Sequence[Start], part: Fitted | None, reach: float) -> Fitted:
         """The nonlinear fit that begins there; what is given with `starts` as `refit` takes it."""
         near = self.found.fitted
         start = replace(near.variant, terms=self.terms(starts))
         known = nuisances_of(self.base, near)
-        return refit(self.base.bench, start, near.track, known, rounds, part, reach)
+        return refit(self.base.bench, start, near.track, known, part=part, reach=reach)
 
     def physical(self, starts: Sequence[Start]) -> bool:
         """Whether what is new lies on the allowed side of its parameters, not far beyond them."""

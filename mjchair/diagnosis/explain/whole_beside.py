@@ -14,9 +14,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
+from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import hypotheses, whole_sizes
 from mjchair.diagnosis.explain.candidates import Start
-from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.explain.whole_sizes import Seen
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.nonlinear import Fitted
@@ -35,12 +36,13 @@ def fits(base: Base, single: Fitted, best: Fitted) -> Iterator[tuple[tuple[Start
     around = base.around
     nothing = _with_best(base, windows, base.starts, around.variant, around.track).chi2
     most = nothing - whole_sizes.chi2(base, best.variant, best.track, windows)
+    reach = rules.reach_of_whole(best=best.total, gain=gain(base, best))
     for start in whole_sizes.starts(base):
         others = [s for s in base.starts if s.effect.key != start.effect.key]
         weigh = partial(_with_best, base, windows, others)
         look = partial(whole_sizes.looked_at, base, windows, weigh)
         for seen in whole_sizes.best_sizes(start, look, nothing, most):
-            made = whole_sizes.fit_from(base, seen.variant, windows)
+            made = whole_sizes.fit_from(base, seen.variant, windows, reach)
             if made is not None:
                 yield (start, *seen.beside), made
 

@@ -64,7 +64,10 @@ def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitte
     """
     windows = worst_windows(base, base.plain)
     nothing = chi2(base, base.plain.variant, base.plain.track, windows)
-    most = nothing - chi2(base, other.variant, other.track, windows) if other else 0.0
+    most, reach = 0.0, np.inf
+    if other is not None:
+        most = nothing - chi2(base, other.variant, other.track, windows)
+        reach = rules.reach_of_whole(best=other.total, gain=gain(base, other))
 
     def weigh(variant: Variant, here: Track) -> Seen:
         return Seen(chi2(base, variant, here, windows), variant)
@@ -72,7 +75,7 @@ def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitte
     look = partial(looked_at, base, windows, weigh)
     for start in starts(base):
         for begin in best_sizes(start, look, nothing, most):
-            made = fit_from(base, begin.variant, windows)
+            made = fit_from(base, begin.variant, windows, reach)
             if made is not None:
                 yield start, made
 
@@ -104,19 +107,20 @@ def starts(base: Base) -> Iterator[Start]:
             yield start
 
 
-def fit_from(base: Base, begin: Variant, windows: Sequence[int]) -> Fitted | None:
+def fit_from(base: Base, begin: Variant, windows: Sequence[int], reach: float) -> Fitted | None:
     """The fit that begins at a chair; None: this chair cannot have it.
 
     Args:
       windows: in which it slides or shimmies: there coarse derivatives lead a fit astray.
+      reach: chi2; a fit that promises more after a round ends there.
     """
-    return _refitted(base, begin, replace(base.around.track, touchy=frozenset(windows)))
+    return _refitted(base, begin, replace(base.around.track, touchy=frozenset(windows)), reach)
 
 
-def _refitted(base: Base, begin: Variant, before: Track) -> Fitted | None:
+def _refitted(base: Base, begin: Variant, before: Track, reach: float = np.inf) -> Fitted | None:
     """The fit that begins at a chair and a track; None: this chair cannot have it."""
     try:
-        return refit(base.bench, begin, before)
+        return refit(base.bench, begin, before, reach=reach)
     except (MjchairError, np.linalg.LinAlgError):
         return None
 

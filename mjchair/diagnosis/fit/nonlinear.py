@@ -154,7 +154,7 @@ def refit(
         model, errors = simulator.compile(start.edit), start.sensor_errors(simulator.channels)
         before = track(simulator, model, bench.noise, errors, before, anew=True)
         nuisances = nuisance_columns(bench, before, start)
-    here = _placed(bench, start, before, nuisances)
+    here = placed(bench, start, before, nuisances)
     most = ASTRAY * nothing if part is None else part.total
     if here.total > most:
         here = _nearer(bench, here, part, most, before, nuisances)
@@ -168,7 +168,7 @@ def refit(
         if done or behind or (k >= FEW and best.total > most):
             break
         try:
-            here = _placed(bench, variant, best.track, nuisances)
+            here = placed(bench, variant, best.track, nuisances)
             if here.total < best.total:
                 brought = best.total - here.total
                 best, fails = _around(bench, here, nuisances, best.std), 0
@@ -218,7 +218,7 @@ def _nearer(
     least, far = _least(here.variant, part), here.variant
     for share in NEARER if part is not None else NEARER[:1]:
         try:
-            there = _placed(bench, _between(least, far, share), before, nuisances)
+            there = placed(bench, _between(least, far, share), before, nuisances)
         except (MjchairError, np.linalg.LinAlgError):  # of what no chair can be
             continue
         here = min(here, there, key=attrgetter("total"))
@@ -236,7 +236,7 @@ def _neutral(term: Term) -> Term:
     )
 
 
-def _placed(
+def placed(
     bench: Bench,
     variant: Variant,
     before: Track | None,
