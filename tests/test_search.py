@@ -294,6 +294,18 @@ def test_a_fit_that_goes_far_is_made_anew_as_long_as_that_brings_much(fits, offs
     assert searching().fit(ONE).fitted.total == end
 
 
+def test_what_is_made_anew_around_a_fit_that_goes_far_ends_as_soon_as_the_fit(fits):
+    """A promise too far behind the best ends a fit, wherever its columns are made."""
+    for total, before in ((1400.0, "as given"), (1300.0, 1400.0), (1299.0, 1300.0)):
+        ended = fit(total, "rolling")
+        ended.variant = replace(ended.variant, offsets={"centre_x": 2.9})
+        ended.track = total
+        fits.answers["rolling", before] = ended
+    best = Tried(Hypothesis((MOTOR,), gain=610.0, score=600.0), fit(1390.0, "motor"))
+    searching().fit(ONE, best)
+    assert fits.reaches == [rules.reach(best=1390.0, gain=610.0)] * 3
+
+
 def test_where_the_linear_order_is_coarse_more_are_fitted(monkeypatch):
     gains = (1000.0, 950.0, 940.0, 930.0, 850.0, 820.0, 810.0, 700.0)
     options = [Hypothesis((effect(f"effect {k}"),), gain=g, score=g) for k, g in enumerate(gains)]

@@ -12,10 +12,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mjchair.diagnosis.explain import whole_sizes
+from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import whole_beside, whole_sizes
 from mjchair.diagnosis.explain.whole_sizes import Seen
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.diagnosis.replay.window_states import Track
 from mjchair.effects.library import MECHANICAL, find
 from mjchair.errors import MjchairError
 
@@ -70,6 +72,38 @@ def test_a_size_that_misses_half_of_what_others_bring_begins_no_fit(other, begin
 
     size = begun(find("relaxation_length"), chi2, other)
     assert (size is not None) == begins
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_a_fit_from_a_size_ends_where_it_falls_too_far_behind(monkeypatch, beside):
+    """Only a fit of other effects tells how far that is."""
+    reaches = []
+    seen = Seen(500.0, Variant(()))
+
+    def refit(bench, begin, track, reach):
+        reaches.append(reach)
+        return "the fit"
+
+    monkeypatch.setattr(whole_sizes, "refit", refit)
+    monkeypatch.setattr(whole_sizes, "chi2", lambda *_: 0.0)
+    monkeypatch.setattr(whole_sizes, "best_sizes", lambda *_: [seen])
+    monkeypatch.setattr(whole_beside, "_with_best", lambda *_: seen)
+    scrub = SimpleNamespace(effect=find("turning_scrub"))
+    monkeypatch.setattr(whole_sizes, "starts", lambda _: [scrub])
+    told = SimpleNamespace(chi2=np.ones(1), variant=None, track=None)
+    base = SimpleNamespace(
+        bench=SimpleNamespace(windows=np.arange(1)),
+        plain=SimpleNamespace(total=6000.0, **vars(told)),
+        around=SimpleNamespace(variant=None, track=Track([], [], [], [])),
+        starts=[],
+    )
+    other = SimpleNamespace(total=1000.0, **vars(told))
+    if beside:
+        assert list(whole_beside.fits(base, other, other)) == [((scrub,), "the fit")]
+        assert reaches == [rules.reach_of_whole(best=1000.0, gain=5000.0)]
+        return
+    assert list(whole_sizes.fits(base, other)) == list(whole_sizes.fits(base))
+    assert reaches == [rules.reach_of_whole(best=1000.0, gain=5000.0), math.inf]
 
 
 def test_a_size_that_brings_nothing_begins_no_fit():

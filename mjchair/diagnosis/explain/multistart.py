@@ -150,12 +150,12 @@ class MultiStart:
 
     def _values(self, share: float) -> list[Mapping[str, float]]:
         """The effects' parameters at a share of the linear fit's coefficients."""
-        return [t.values for t in hypotheses.terms(self.base.reduced, self.hypothesis, share)]
+        return [t.values for t in self._at(share).terms]
 
     def _begun(self, share: float) -> Fitted | None:
         """The fit that begins at a share of the linear fit's coefficients; None: none can be.
 
-        Its columns of what is roughly known are those of the start.
+        The columns of what is roughly known are those that stand already: none is made anew.
         """
         try:
             return self._refit(share)
@@ -288,7 +288,7 @@ def made_anew(
 def _end_alike(one: Fitted, other: Fitted) -> bool:
     """Whether two fits of the same effects end in the same place.
 
-    What is made anew around one of them is then made around the other as well.
+    Whatever is made anew around both then ends in one place too, so it is made around one of them.
     """
     sizes = zip(one.variant.terms, other.variant.terms, strict=True)
     apart = [
