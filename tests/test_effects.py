@@ -27,7 +27,7 @@ CONTRACT = {
     "tire_friction": {"factor"},
     "relaxation_length": {"length"},
     "turning_scrub": {"moment"},
-    "caster_friction": {"moment"},
+    "caster_friction": {"moment", "creep"},
     "caster_trail": {"length"},
     "torque_gain": {"left", "right"},
     "torque_delay": {"delay"},
@@ -247,6 +247,38 @@ def test_bearings_brake_a_wheel_in_the_air_as_they_say(speed):
         mujoco.mj_forward(model, data)
         drag.append(data.qfrc_passive[dof])
     assert drag[0] - drag[1] == pytest.approx(0.05 * speed, rel=1e-9)
+
+
+def swivel_rate(spec, moment):
+    """Rate (rad/s) at which a lifted swivel of a chair turns that a moment (N m) has turned."""
+    model = spec.compile()
+    model.opt.gravity[:] = 0.0
+    data = mujoco.MjData(model)
+    data.qpos[2] += 1.0
+    swivels = [model.joint(f"{side}_caster_swivel").dofadr[0] for side in ("left", "right")]
+    with mjchair.installed():
+        for _ in range(200):
+            data.qfrc_applied[swivels] = moment
+            mujoco.mj_step(model, data)
+    return data.qvel[swivels[0]]
+
+
+@pytest.mark.parametrize(("moment", "creep"), [(0.2, 0.1), (0.8, 0.1), (0.8, 0.44), (3.0, 0.05)])
+def test_a_caster_creeps_in_proportion_below_its_friction_and_slides_above_it(moment, creep):
+    spec = mjchair.load_spec()
+    find("caster_friction").apply(spec, {"moment": moment, "creep": creep})
+    for share in (0.5, 0.9):
+        assert swivel_rate(spec, share * moment) == pytest.approx(share * creep, rel=0.01)
+    assert swivel_rate(spec, 1.2 * moment) > 10.0 * creep
+
+
+def test_frictions_of_one_caster_add_up_and_so_do_their_slopes():
+    spec, effect = mjchair.load_spec(), find("caster_friction")
+    effect.apply(spec, {"moment": 0.3, "creep": 0.1})
+    effect.apply(spec, {"moment": 0.5, "creep": 0.25})
+    slope = 0.3 / 0.1 + 0.5 / 0.25  # N m s
+    assert swivel_rate(spec, 0.4) == pytest.approx(0.4 / slope, rel=0.01)
+    assert swivel_rate(spec, 0.9) > 1.0
 
 
 def test_a_light_wind_is_told_from_still_air_and_what_goes_with_it():

@@ -235,5 +235,5 @@ def test_a_better_place_beside_which_no_chair_can_be_is_a_step_that_failed(monke
 )
 def test_a_size_ends_on_a_bound_or_beside_it(effect, value, on):
     effect = library.find(effect)
-    (p,) = effect.parameters
+    p = effect.parameters[0]
     assert bool(nonlinear.on_bound(Term(effect, {p.name: value}, (p.name,)))) == on
