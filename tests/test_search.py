@@ -67,6 +67,7 @@ def fit(total, *keys, promised=None):
         sigmas=dict.fromkeys(keys, 3.0),
         at_bound=(),
         correlation={},
+        anew=None,
     )
 
 
@@ -292,6 +293,27 @@ def test_a_fit_that_goes_far_is_made_anew_as_long_as_that_brings_much(fits, offs
         ended.track = total
         fits.answers["rolling", before] = ended
     assert searching().fit(ONE).fitted.total == end
+
+
+@pytest.mark.parametrize(
+    ("last", "reach", "kept"), [(1405.0, np.inf, True), (1405.0, 1402.0, False)]
+)
+def test_what_was_made_anew_around_a_fit_and_is_no_better_is_not_made_twice(
+    fits, monkeypatch, last, reach, kept
+):
+    """Unless it ended early, too far behind the best."""
+    monkeypatch.setattr(multistart.MultiStart, "_reach", lambda _: reach)
+    for total, before in ((1500.0, "as given"), (1400.0, 1500.0), (last, 1400.0)):
+        ended = fit(total, "rolling", promised=min(total, 1401.0) if total != last else last)
+        ended.variant = replace(ended.variant, offsets={"centre_x": 2.9})
+        ended.track = total
+        fits.answers["rolling", before] = ended
+    looking = searching()
+    found = looking.fit(ONE)
+    assert found.fitted.total == 1400.0
+    asked = len(fits.asked)
+    assert looking.anew(found).total == last
+    assert (len(fits.asked) == asked) == kept
 
 
 def test_what_is_made_anew_around_a_fit_that_goes_far_ends_as_soon_as_the_fit(fits):

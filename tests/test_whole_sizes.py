@@ -106,6 +106,29 @@ def test_a_fit_from_a_size_ends_where_it_falls_too_far_behind(monkeypatch, besid
     assert reaches == [rules.reach_of_whole(best=1000.0, gain=5000.0), math.inf]
 
 
+def test_sizes_are_looked_at_once_and_each_fit_begins_as_often_as_it_is_asked_for(monkeypatch):
+    """The noise and the search both ask for them."""
+    looks, begins = [], []
+
+    def looked_at(base, windows, weigh, term):
+        looks.append(term.values["moment"])
+        return Seen(500.0 + term.values["moment"], Variant(()))
+
+    monkeypatch.setattr(whole_sizes, "looked_at", looked_at)
+    monkeypatch.setattr(whole_sizes, "chi2", lambda *_: 2000.0)
+    monkeypatch.setattr(whole_sizes, "fit_from", lambda *_: begins.append("a fit") or "a fit")
+    scrub = find("turning_scrub")
+    plain = SimpleNamespace(variant=None, track=None, chi2=np.ones(1))
+    base = SimpleNamespace(
+        bench=SimpleNamespace(windows=np.arange(1)),
+        plain=plain,
+        starts=[SimpleNamespace(effect=scrub, free=("moment",))],
+        looked={},
+    )
+    assert list(whole_sizes.fits(base)) == list(whole_sizes.fits(base)) != []
+    assert sorted(looks) == sorted(set(looks)) and len(begins) == 2
+
+
 def test_a_size_that_brings_nothing_begins_no_fit():
     assert begun(find("tire_friction"), lambda v: 1000.0 + 50.0 * abs(v - 1.0)) is None
 

@@ -187,14 +187,20 @@ class Fits:
         hypothesis, first = tried.hypothesis, tried.fitted
         known = _of(hypothesis, self.again)
         if known is None:
-            self.say(f"fit of {hypothesis.label}, with everything made anew around it")
-
-            def note(why: str) -> None:
-                self._note(f"the fit of {hypothesis.label} was not made anew: {why}")
-
-            known = made_anew(self.base.bench, first.variant, first.track, note=note) or first
+            known = first.anew or self._made_around(tried)
             self.again.append(Tried(hypothesis, known))
         return known
+
+    def _made_around(self, tried: Tried) -> Fitted:
+        """The fit that begins where another ended, all columns made there; else that one."""
+        label, first = tried.hypothesis.label, tried.fitted
+        self.say(f"fit of {label}, with everything made anew around it")
+
+        def note(why: str) -> None:
+            self._note(f"the fit of {label} was not made anew: {why}")
+
+        made = made_anew(self.base.bench, first.variant, first.track, note=note)
+        return first if made is None else made
 
     def last_fit(self, tried: Tried) -> Fitted:
         """The fit with everything made anew, or a better one from beside its sizes.

@@ -256,6 +256,8 @@ class MultiStart:
         for _ in range(ANEW):
             again = made_anew(self.base.bench, start, fitted.track, reach=self._reach())
             if again is None or fitted.total - again.total < rules.WORTH:
+                if again is not None and start is fitted.variant and not self._is_behind(again):
+                    fitted.anew = again  # nobody need make it a second time
                 return _better(fitted, again) or fitted
             fitted, start = again, again.variant
             if self._is_behind(fitted):

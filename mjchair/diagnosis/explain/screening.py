@@ -5,9 +5,10 @@ In: a study and effects. Out: a `Base`, on which everything after it rests.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -70,6 +71,7 @@ class Base:
       found: effects without which they passed for noise; None: noise hides none.
       best: the hypothesis of any size that is best by linear algebra, fitted while the noise was
         sought; None: none brings enough, or this chair cannot have it.
+      looked: what was seen at whole sizes (whole_sizes.py), which are looked at twice.
     """
 
     bench: Bench
@@ -83,6 +85,7 @@ class Base:
     reduced: Reduced
     found: Found | None = None
     best: Found | None = None
+    looked: dict[Hashable, Any] = field(default_factory=dict, init=False)
 
     @cached_property
     def acting_alone(self) -> ActingIn | None:

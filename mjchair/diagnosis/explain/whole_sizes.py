@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -72,7 +71,13 @@ def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitte
     def weigh(variant: Variant, here: Track) -> Seen:
         return Seen(chi2(base, variant, here, windows), variant)
 
-    look = partial(looked_at, base, windows, weigh)
+    def look(term: Term) -> Seen:
+        key = (term.effect.key, *term.values.values())
+        if key not in base.looked:
+            base.looked[key] = looked_at(base, windows, weigh, term)
+        seen: Seen = base.looked[key]
+        return seen
+
     for start in starts(base):
         for begin in best_sizes(start, look, nothing, most):
             made = fit_from(base, begin.variant, windows, reach)

@@ -69,6 +69,8 @@ class Fitted:
       correlation: of two parameters of one effect.
       confined: of the windows fitted to, `System.confined` together: what a chair costs, in chi2,
         that fits only for few of the ways in which its windows may begin.
+      anew: the fit with everything made anew around this one, where that was made and is no better;
+        None: it was not made.
     """
 
     variant: Variant
@@ -85,6 +87,7 @@ class Fitted:
     at_least: dict[ParameterId, float] = field(default_factory=dict)
     correlation: dict[frozenset[ParameterId], float] = field(default_factory=dict)
     confined: float = 0.0
+    anew: Fitted | None = None
 
     def std_of_difference(self, one: ParameterId, other: ParameterId) -> float:
         """Standard deviation of one parameter less another of the same effect, SI; 0: not fitted.
