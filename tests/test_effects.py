@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import mjchair
-from mjchair.effects import bearing_friction, rolling_resistance, toe
+from mjchair.effects import bearing_friction, caster_friction, rolling_resistance, toe
 from mjchair.effects.library import MECHANICAL, find, library, names
 from mjchair.errors import MjchairError
 from mjchair.model import parts
@@ -249,18 +249,18 @@ def test_bearings_brake_a_wheel_in_the_air_as_they_say(speed):
     assert drag[0] - drag[1] == pytest.approx(0.05 * speed, rel=1e-9)
 
 
-def swivel_rate(spec, moment):
+def swivel_rate(spec, moment, side="left"):
     """Rate (rad/s) at which a lifted swivel of a chair turns that a moment (N m) has turned."""
     model = spec.compile()
     model.opt.gravity[:] = 0.0
     data = mujoco.MjData(model)
     data.qpos[2] += 1.0
-    swivels = [model.joint(f"{side}_caster_swivel").dofadr[0] for side in ("left", "right")]
+    swivel = model.joint(f"{side}_caster_swivel").dofadr[0]
     with mjchair.installed():
         for _ in range(200):
-            data.qfrc_applied[swivels] = moment
+            data.qfrc_applied[swivel] = moment
             mujoco.mj_step(model, data)
-    return data.qvel[swivels[0]]
+    return data.qvel[swivel]
 
 
 @pytest.mark.parametrize(("moment", "creep"), [(0.2, 0.1), (0.8, 0.1), (0.8, 0.44), (3.0, 0.05)])
@@ -270,6 +270,17 @@ def test_a_caster_creeps_in_proportion_below_its_friction_and_slides_above_it(mo
     for share in (0.5, 0.9):
         assert swivel_rate(spec, share * moment) == pytest.approx(share * creep, rel=0.01)
     assert swivel_rate(spec, 1.2 * moment) > 10.0 * creep
+
+
+@pytest.mark.parametrize(("side", "free"), [("left", "right"), ("right", "left")])
+def test_one_caster_holds_and_the_other_turns(side, free):
+    spec = mjchair.load_spec()
+    values = {"left": 0.0, "right": 0.0, "creep": 0.1, side: 0.5}
+    caster_friction.ONE_SIDED.apply(spec, values)
+    assert swivel_rate(spec, 0.25, side) == pytest.approx(0.05, rel=0.01)
+    assert swivel_rate(spec, 0.25, free) > 1.0
+    said = caster_friction.ONE_SIDED.remark(values, {side: 0.03})
+    assert said == f"{side} +0.50 ± 0.03 N m, the {side} caster by itself"
 
 
 def test_frictions_of_one_caster_add_up_and_so_do_their_slopes():

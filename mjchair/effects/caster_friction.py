@@ -1,18 +1,22 @@
-"""Dry friction in the swivels of the casters, which gives way a little before it slides."""
+"""Dry friction in the swivels of the casters, which give way a little before they slide.
+
+Two forms, one name: both swivels hold alike, or each by itself, as where hair winds round one stem.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from mjchair.effects.effect import Effect, Parameter, Seed
+from mjchair.effects.effect import Effect, Parameter
+from mjchair.effects.left_and_right import SIDES, size_words
 from mjchair.model import parts
 
-CREEP = 0.1  # rad/s, where a fit begins
-TYPICAL = 0.2  # N m
-PROBE = 0.25  # of the typical moment, at which the response is taken
+CREEP = Parameter("creep", "rad/s", 0.1, 0.03, 1.0, neutral=0.1, sized=False, cautious=0.1)
 LEAST, MOST = 0.02, 0.999  # impedance of MuJoCo's constraint: less does nothing, more is stiff
 
 
@@ -23,10 +27,15 @@ def edit(spec: mujoco.MjSpec, moment: float, creep: float) -> None:
     and a tread give way. MuJoCo's own friction has one slope for all moments, so that 0.8 N m on
     the shipped chair is in full at 0.44 rad/s only: it then acts like a damper.
     """
-    if moment == 0.0:
+    of_one_side(spec, moment, moment, creep)
+
+
+def of_one_side(spec: mujoco.MjSpec, left: float, right: float, creep: float) -> None:
+    """Add `left` and `right` (N m) to the friction of the swivels, as `edit` does."""
+    if left == right == 0.0:
         return
     inverse_inertia = _inverse_inertias(spec)
-    for caster in parts.CASTERS:
+    for caster, moment in zip(parts.CASTERS, (left, right), strict=True):
         joint = parts.named(spec.joints, f"{caster}_swivel", "joint")
         own = _ratio(joint.solimp_friction[0]) if joint.frictionloss > 0.0 else 0.0
         joint.frictionloss += moment
@@ -52,7 +61,7 @@ def _rate(joint: Any) -> float:
 
 
 def _inverse_inertias(spec: mujoco.MjSpec) -> dict[str, float]:
-    """Name of each hinge -> its inverse inertia as MuJoCo's constraints have it, 1/(kg m^2)."""
+    """Name of each joint -> its inverse inertia as MuJoCo's constraints have it, 1/(kg m^2)."""
     model = spec.copy().compile()
     return {
         model.joint(j).name: float(model.dof_invweight0[model.jnt_dofadr[j]])
@@ -60,20 +69,31 @@ def _inverse_inertias(spec: mujoco.MjSpec) -> dict[str, float]:
     }
 
 
-def _combine(coefficients: np.ndarray) -> dict[str, float]:
-    return {"moment": float(np.clip(TYPICAL * coefficients[0], 0.0, 10.0)), "creep": CREEP}
+def _of_one_side(values: Mapping[str, float], std: Mapping[str, float]) -> str:
+    sides = {side: values[side] for side in SIDES if values[side]}
+    caster = f"the {next(iter(sides))} caster" if len(sides) == 1 else "each caster"
+    return f"{size_words(sides, std, 1.0, '+.2f N m')}, {caster} by itself"
 
 
 EFFECT = Effect(
     name="caster_friction",
-    parameters=(
-        Parameter("moment", "N m", TYPICAL, 0.0, 10.0),
-        Parameter("creep", "rad/s", CREEP, 0.03, 1.0, CREEP, sized=False, cautious=0.1),
-    ),
+    parameters=(Parameter("moment", "N m", 0.2, 0.0, 10.0), CREEP),
     signature="hysteresis when the swivel reverses its direction",
     source="a tight headset holds 0.1-0.5 N m; assumed",
     edit=edit,
     everywhere=True,
     by_hand="lift each caster and turn it about its stem with a spring balance",
-    seeds=(Seed(({"moment": PROBE * TYPICAL, "creep": CREEP},), _combine, (1.0 / PROBE,), 0.0),),
+)
+ONE_SIDED = replace(
+    EFFECT,
+    parameters=(
+        Parameter("left", "N m", 0.3, 0.0, 10.0),
+        Parameter("right", "N m", 0.3, 0.0, 10.0),
+        CREEP,
+    ),
+    signature="hysteresis when one swivel reverses its direction, and yaw while it holds",
+    source="sizes assumed, as of both",
+    edit=of_one_side,
+    everywhere=False,
+    remark=_of_one_side,
 )

@@ -201,6 +201,11 @@ class Effect:
         """Parameters that a fit may move."""
         return tuple(p for p in self.parameters if p.fitted)
 
+    @property
+    def sizes(self) -> tuple[Parameter, ...]:
+        """Those of them that say how large it is."""
+        return tuple(p for p in self.fitted if p.sized)
+
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name."""
         return next(p for p in self.parameters if p.name == name)
@@ -214,19 +219,19 @@ class Effect:
         return {p.name: p.neutral if p.fitted else p.typical for p in self.parameters}
 
     def starts(self) -> tuple[Seed, ...]:
-        """The seeds, or one typical step a parameter."""
+        """The seeds, or one typical step of each size."""
         if self.seeds is not None:
             return self.seeds
         neutral = self.neutral()
-        points = tuple({**neutral, p.name: p.neutral + p.probe * step(p)} for p in self.fitted)
+        points = tuple({**neutral, p.name: p.neutral + p.probe * step(p)} for p in self.sizes)
 
         def combine(coefficients: Any) -> Values:
             values = dict(neutral)
-            for p, c in zip(self.fitted, coefficients, strict=True):
+            for p, c in zip(self.sizes, coefficients, strict=True):
                 values[p.name] = clip(p, p.neutral + float(c) * step(p))
             return values
 
-        return (Seed(points, combine, tuple(1.0 / p.probe for p in self.fitted)),)
+        return (Seed(points, combine, tuple(1.0 / p.probe for p in self.sizes)),)
 
     def on(self, spec: mujoco.MjSpec) -> Effect:
         """This effect with the bounds that follow from the chair in hand."""

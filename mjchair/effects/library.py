@@ -65,6 +65,7 @@ MECHANICAL = (
     relaxation_length.EFFECT,
     turning_scrub.EFFECT,
     caster_friction.EFFECT,
+    caster_friction.ONE_SIDED,
     caster_trail.EFFECT,
     torque_gain.EFFECT,
     torque_delay.EFFECT,

@@ -37,7 +37,7 @@ def from_file(path: str | os.PathLike[str]) -> Effect:
         raise MjchairError(f"{file} has no EFFECT that is an mjchair.effects.effect.Effect")
     if effect.name in names():
         raise MjchairError(f"{file}: the library has an effect {effect.name!r}; name yours anew")
-    if not effect.fitted:
+    if not effect.sizes:
         raise MjchairError(f"{file}: {effect.name} has no parameter to fit; give it one")
     for p in effect.parameters:
         _check_parameter(p, str(file))
@@ -52,7 +52,7 @@ def check(effect: Effect, spec: mujoco.MjSpec) -> None:
     """
 
     def attempt() -> None:
-        for p in effect.fitted:
+        for p in effect.sizes:
             tried = spec.copy()
             effect.apply(tried, {p.name: p.neutral + step(p)})
             tried.compile()
@@ -66,7 +66,7 @@ def _check_parameter(p: Parameter, source: str) -> None:
             f"{source}: {p.name} is {p.neutral:g} where nothing acts and {p.typical:g} as a rule; "
             f"both must be within {p.low:g} to {p.high:g}"
         )
-    if p.fitted and p.typical == p.neutral:
+    if p.fitted and p.sized and p.typical == p.neutral:
         raise MjchairError(
             f"{source}: {p.name} is {p.typical:g} as a rule and where nothing acts; "
             "the two must differ"

@@ -24,7 +24,7 @@ from mjchair.diagnosis.replay import derivatives
 from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.pulses import Force, Pulse
 from mjchair.diagnosis.replay.window_states import Track
-from mjchair.effects.effect import Effect, Place, Values, Wave, clip, step
+from mjchair.effects.effect import Effect, Parameter, Place, Values, Wave, clip, step
 from mjchair.errors import MjchairError
 
 Array = NDArray[np.float64]
@@ -54,11 +54,15 @@ class Start:
         """The effect with values from the coefficients of the columns."""
         return Term(self.effect, self.combine(coefficients), self.free)
 
+    @property
+    def sizes(self) -> tuple[Parameter, ...]:
+        """The free parameters that say how large the effect is: one a column, without seeds."""
+        return tuple(p for p in self.effect.sizes if p.name in self.free)
+
     def allows(self, coefficients: Array) -> bool:
         """Whether coefficients lie on the allowed side of every parameter."""
-        if self.effect.seeds is None and len(coefficients) == len(self.free):
-            for c, name in zip(coefficients, self.free, strict=True):
-                p = self.effect.parameter(name)
+        if self.effect.seeds is None and len(coefficients) == len(self.sizes):
+            for c, p in zip(coefficients, self.sizes, strict=True):
                 if c < 0.0 and p.neutral in (p.low, p.high):
                     return False
         return not (coefficients < self.least).any()
@@ -68,13 +72,12 @@ class Start:
 
         Where they do not, what linear algebra promises is far from what the effect can bring.
         """
-        if self.effect.seeds is not None or len(coefficients) != len(self.free):
+        if self.effect.seeds is not None or len(coefficients) != len(self.sizes):
             return True
-        for c, name in zip(coefficients, self.free, strict=True):
-            p = self.effect.parameter(name)
+        for c, p in zip(coefficients, self.sizes, strict=True):
             by = float(c) * step(p)
             room = p.high - p.neutral if by > 0.0 else p.neutral - p.low
-            if p.sized and abs(by) > BEYOND * room:
+            if abs(by) > BEYOND * room:
                 return False
         return True
 
@@ -169,14 +172,15 @@ def _add_points(out: Candidates, around: Around, effect: Effect) -> None:
 
 
 def _choices(effect: Effect, group: EffectGroup, ids: tuple[EffectColumn, ...]) -> list[Start]:
-    """A start for every choice of parameters, all of them last."""
+    """A start for every choice of sizes, all of them last; what only shapes them is always free."""
+    shapes = tuple(p.name for p in effect.fitted if not p.sized)
     return [
         Start(
             effect=effect,
             group=group,
             columns=tuple(ids[j] for j in chosen),
             combine=_some(effect, chosen),
-            free=tuple(effect.fitted[j].name for j in chosen),
+            free=(*(effect.sizes[j].name for j in chosen), *shapes),
         )
         for count in range(1, len(ids) + 1)
         for chosen in combinations(range(len(ids)), count)
@@ -187,7 +191,7 @@ def _some(effect: Effect, chosen: Sequence[int]) -> Callable[[Array], Values]:
     def combine(coefficients: Array) -> Values:
         values = effect.neutral()
         for j, c in zip(chosen, coefficients, strict=True):
-            p = effect.fitted[j]
+            p = effect.sizes[j]
             values[p.name] = clip(p, p.neutral + float(c) * step(p))
         return values
 

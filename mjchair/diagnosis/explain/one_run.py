@@ -51,12 +51,13 @@ class InOneRun:
         """One of the effects, and standard errors of its sizes where linear algebra tells them."""
         (start,) = option.starts
         (term,) = hypotheses.terms(self.acting.reduced, option)
-        if start.effect.seeds is not None or len(start.columns) != len(start.free):
+        if start.effect.seeds is not None or len(start.columns) != len(start.sizes):
             return term, {}
         at = self.acting.reduced.index(start.columns)
         errors = np.sqrt(np.diag(np.linalg.inv(self.acting.reduced.G[np.ix_(at, at)])))
-        sizes = [abs(step(start.effect.parameter(name))) for name in start.free]
-        return term, dict(zip(start.free, (errors * sizes).tolist(), strict=True))
+        sizes = [abs(step(p)) for p in start.sizes]
+        names = [p.name for p in start.sizes]
+        return term, dict(zip(names, (errors * sizes).tolist(), strict=True))
 
 
 def is_clear(base: Base, gap: Gap) -> bool:
