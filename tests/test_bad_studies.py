@@ -110,6 +110,24 @@ CASES = {
         {"columns": coast(0.5) | {"left_wheel_speed": coast(0.5)["left_wheel_speed"] * 57.3}},
         "left_wheel_speed looks like degrees: it tells 57.3 times what right_wheel_speed does",
     ),
+    "turns a minute under a header of deg/s, beside the angle": (
+        {
+            "columns": coast()
+            | {
+                "left_wheel_angle": np.cumsum(coast()["left_wheel_speed"]) * (TIME[1] - TIME[0]),
+                "left_wheel_speed": coast()["left_wheel_speed"] / 6.0,
+            }
+        },
+        r"left_wheel_speed looks like another unit: it tells 0.17 times what left_wheel_angle does",
+    ),
+    "turns a minute under a header of deg/s, beside places": (
+        {
+            "columns": {"left_wheel_speed": coast()["left_wheel_speed"] / 6.0}
+            | {"position.x": 1.2 * TIME, "position.y": 0.0 * TIME}
+        },
+        r"left_wheel_speed looks like another unit: by it the wheel rolls 0\.\d+ m, and the chair "
+        r"gets 4\.\d m away; give rad/s, or the unit in its header, as in left_wheel_speed \[rpm\]",
+    ),
     "a velocity in km/h beside wheels": (
         {"columns": coast() | {"velocity.x": 3.5 * 0.3 * coast()["left_wheel_speed"]}},
         r"velocity.x looks like km/h: it tells 3.\d+ times .* as in velocity.x \[km/h\]",

@@ -31,6 +31,9 @@ FORWARD, YAW, PULL = 0.05, 0.03, 0.05  # m/s, rad/s and m/s: motion below which 
 OTHER_START = 1.0  # m/s, and the speed itself, by which a first speed is not the one that is seen
 BIAS = 0.2  # rad/s, that a gyroscope may tell at rest (assumption)
 WAY = 0.5  # m by the wheels, below which it is not compared with the places
+FURTHER = 3.0  # times what its wheels roll that no chair gets away
+# a rate in rad/s, deg/s, turns a second or a minute, over the same in another of these
+RATES = (6.0, 2.0 * np.pi, 60.0 / (2.0 * np.pi), DEGREES)
 LENGTHS = {"mm": 1e3, "cm": 1e2, "in": 39.37}  # units of a length that people use, a metre
 
 
@@ -59,6 +62,7 @@ def check(trial: Trial, axle: RearAxle) -> None:
     _compare(trial, axle, turning(trial, axle), YAW)
     _compare_with_acceleration(trial, axle)
     _compare_with_way(trial, axle)
+    _compare_speeds(trial, axle)
     _check_places(trial)
 
 
@@ -282,6 +286,42 @@ def _compare_with_way(trial: Trial, axle: RearAxle) -> None:
     angles = [c for c in ("left_wheel_angle", "right_wheel_angle") if c in trial.channels]
     if TURN / NEAR < gone / rolled < TURN * NEAR and angles:
         _refuse(trial, angles[0], "turns", why, "rev")
+
+
+def _compare_speeds(trial: Trial, axle: RearAxle) -> None:
+    """A wheel's speed tells what its angle does, and not so little that the places contradict it.
+
+    Turns a minute under a header of deg/s are a sixth of it. A wheel may roll on the spot, as on
+    rollers, but a chair gets no further than its wheels roll.
+    """
+    rolled = forward(trial, axle)
+    for name in _speeds(trial):
+        one, angle = rolled[name], name.replace("_speed", "_angle")
+        if angle in rolled and rolled[angle].time.size:
+            two = at(rolled[angle], one.time)
+            sizes = float(np.linalg.norm(one.values)), float(np.linalg.norm(two))
+            moves = max(sizes) > FORWARD * np.sqrt(two.size) and min(sizes) > 0.0
+            alike = float(one.values @ two) > ALIKE * sizes[0] * sizes[1]
+            ratio = sizes[0] / max(sizes[1], 1e-9)
+            if moves and alike and _is_of_units(ratio):
+                why = f"it tells {ratio:.2g} times what {angle} does"
+                _refuse(trial, name, "another unit", why, "rpm", "deg/s")
+        way = float(np.trapezoid(np.abs(one.values), one.time))
+        if _placed(trial) and (gone := _distance(trial)) > max(FURTHER * way, WAY):
+            why = f"by it the wheel rolls {way:.2g} m, and the chair gets {gone:.2g} m away"
+            _refuse(trial, name, "another unit", why, "rpm", "deg/s")
+
+
+def _is_of_units(ratio: float) -> bool:
+    """Whether a channel tells as many times another that is the same as two units of a rate do."""
+    return any(1.0 / CLOSE < max(ratio, 1.0 / ratio) / by < CLOSE for by in RATES)
+
+
+def _distance(trial: Trial) -> float:
+    """How far the chair gets from where a run begins, m."""
+    x, y = (_mean(trial, f"position.{axis}") for axis in "xy")
+    across = at(y, x.time)
+    return float(np.hypot(x.values - x.values[0], across - across[0]).max())
 
 
 def _check_places(trial: Trial) -> None:
