@@ -20,21 +20,21 @@ def starts():
 
 def test_a_column_is_the_answer_to_one_size_with_what_shapes_it_as_it_is():
     (seed,) = EFFECT.starts()
-    assert [point["creep"] for point in seed.points] == [0.1, 0.1]
+    assert [point["slope"] for point in seed.points] == [2.0, 2.0]
     sizes = np.array([[point["left"], point["right"]] for point in seed.points])
     np.testing.assert_allclose(sizes * np.array(seed.factors)[:, None], 0.3 * np.eye(2))
 
 
 def test_what_shapes_an_effect_is_free_in_every_choice_of_its_sizes():
     free = [start.free for start in starts()]
-    assert free == [("left", "creep"), ("right", "creep"), ("left", "right", "creep")]
+    assert free == [("left", "slope"), ("right", "slope"), ("left", "right", "slope")]
     assert [len(start.columns) for start in starts()] == [1, 1, 2]
 
 
 def test_coefficients_are_of_the_sizes_alone():
     left, _, both = starts()
-    assert left.term(np.array([2.0])).values == {"left": 0.6, "right": 0.0, "creep": 0.1}
-    assert both.term(np.array([1.0, 2.0])).values == {"left": 0.3, "right": 0.6, "creep": 0.1}
+    assert left.term(np.array([2.0])).values == {"left": 0.6, "right": 0.0, "slope": 2.0}
+    assert both.term(np.array([1.0, 2.0])).values == {"left": 0.3, "right": 0.6, "slope": 2.0}
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,9 @@ def test_sizes_are_on_their_side_and_not_far_beyond_their_bounds(coefficients, a
     assert both.can_be(np.array(coefficients)) == possible
 
 
-def test_the_rate_at_which_friction_is_in_full_has_bounds():
-    EFFECT.check({"left": 0.5, "creep": 0.03})
-    with pytest.raises(MjchairError, match=r"creep is 0\.01 rad/s; it must be within 0\.03 to 1"):
-        EFFECT.check({"left": 0.5, "creep": 0.01})
+def test_the_slope_below_the_friction_has_bounds():
+    EFFECT.check({"left": 0.5, "slope": 0.3})
+    with pytest.raises(
+        MjchairError, match=r"slope is 0\.1 N m s/rad; it must be within 0\.3 to 60"
+    ):
+        EFFECT.check({"left": 0.5, "slope": 0.1})

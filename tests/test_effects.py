@@ -27,7 +27,7 @@ CONTRACT = {
     "tire_friction": {"factor"},
     "relaxation_length": {"length"},
     "turning_scrub": {"moment"},
-    "caster_friction": {"moment", "creep"},
+    "caster_friction": {"moment", "slope"},
     "caster_trail": {"length"},
     "torque_gain": {"left", "right"},
     "torque_delay": {"delay"},
@@ -263,19 +263,19 @@ def swivel_rate(spec, moment, side="left"):
     return data.qvel[swivel]
 
 
-@pytest.mark.parametrize(("moment", "creep"), [(0.2, 0.1), (0.8, 0.1), (0.8, 0.44), (3.0, 0.05)])
-def test_a_caster_creeps_in_proportion_below_its_friction_and_slides_above_it(moment, creep):
+@pytest.mark.parametrize(("moment", "slope"), [(0.2, 2.0), (0.8, 8.0), (0.8, 1.8), (3.0, 60.0)])
+def test_a_caster_creeps_in_proportion_below_its_friction_and_slides_above_it(moment, slope):
     spec = mjchair.load_spec()
-    find("caster_friction").apply(spec, {"moment": moment, "creep": creep})
+    find("caster_friction").apply(spec, {"moment": moment, "slope": slope})
     for share in (0.5, 0.9):
-        assert swivel_rate(spec, share * moment) == pytest.approx(share * creep, rel=0.01)
-    assert swivel_rate(spec, 1.2 * moment) > 10.0 * creep
+        assert swivel_rate(spec, share * moment) == pytest.approx(share * moment / slope, rel=0.01)
+    assert swivel_rate(spec, 1.2 * moment) > 10.0 * moment / slope
 
 
 @pytest.mark.parametrize(("side", "free"), [("left", "right"), ("right", "left")])
 def test_one_caster_holds_and_the_other_turns(side, free):
     spec = mjchair.load_spec()
-    values = {"left": 0.0, "right": 0.0, "creep": 0.1, side: 0.5}
+    values = {"left": 0.0, "right": 0.0, "slope": 5.0, side: 0.5}
     caster_friction.ONE_SIDED.apply(spec, values)
     assert swivel_rate(spec, 0.25, side) == pytest.approx(0.05, rel=0.01)
     assert swivel_rate(spec, 0.25, free) > 1.0
@@ -283,13 +283,16 @@ def test_one_caster_holds_and_the_other_turns(side, free):
     assert said == f"{side} +0.50 ± 0.03 N m, the {side} caster by itself"
 
 
-def test_frictions_of_one_caster_add_up_and_so_do_their_slopes():
+def test_frictions_of_one_caster_add_up_and_a_little_changes_little():
     spec, effect = mjchair.load_spec(), find("caster_friction")
-    effect.apply(spec, {"moment": 0.3, "creep": 0.1})
-    effect.apply(spec, {"moment": 0.5, "creep": 0.25})
-    slope = 0.3 / 0.1 + 0.5 / 0.25  # N m s
+    effect.apply(spec, {"moment": 0.3, "slope": 3.0})
+    effect.apply(spec, {"moment": 0.5, "slope": 2.0})
+    slope = (0.3 * 3.0 + 0.5 * 2.0) / 0.8
     assert swivel_rate(spec, 0.4) == pytest.approx(0.4 / slope, rel=0.01)
     assert swivel_rate(spec, 0.9) > 1.0
+    held = swivel_rate(spec, 0.4)
+    effect.apply(spec, {"moment": 1e-6, "slope": 60.0})
+    assert swivel_rate(spec, 0.4) == pytest.approx(held, rel=1e-3)
 
 
 def test_a_light_wind_is_told_from_still_air_and_what_goes_with_it():

@@ -16,33 +16,39 @@ from mjchair.effects.effect import Effect, Parameter
 from mjchair.effects.left_and_right import SIDES, size_words
 from mjchair.model import parts
 
-CREEP = Parameter("creep", "rad/s", 0.1, 0.03, 1.0, neutral=0.1, sized=False, cautious=0.1)
+# MuJoCo's own slope on the shipped chair is 1.8; a fit begins there
+SLOPE = Parameter(
+    "slope", "N m s/rad", 2.0, 0.3, 60.0, neutral=2.0, scale=1.0, sized=False, cautious=2.0
+)
 LEAST, MOST = 0.02, 0.999  # impedance of MuJoCo's constraint: less does nothing, more is stiff
 
 
-def edit(spec: mujoco.MjSpec, moment: float, creep: float) -> None:
-    """Add `moment` (N m) of dry friction to each swivel, in full from a rate of `creep` (rad/s) on.
+def edit(spec: mujoco.MjSpec, moment: float, slope: float) -> None:
+    """Add `moment` (N m) of dry friction to each swivel.
 
-    Below that rate the friction is proportional to the rate, which stands for how a headset, a fork
-    and a tread give way. MuJoCo's own friction has one slope for all moments, so that 0.8 N m on
-    the shipped chair is in full at 0.44 rad/s only: it then acts like a damper.
+    A slow swivel is held in proportion to its rate, by `slope` (N m s/rad) up to the moment, which
+    stands for how a headset, a fork and a tread give way. MuJoCo's own friction has one slope for
+    all moments: on the shipped chair 0.8 N m would be in full from 0.44 rad/s on only, and act like
+    a damper below. Beside friction that a swivel has already, the slope is the mean by moments.
     """
-    of_one_side(spec, moment, moment, creep)
+    of_one_side(spec, moment, moment, slope)
 
 
-def of_one_side(spec: mujoco.MjSpec, left: float, right: float, creep: float) -> None:
+def of_one_side(spec: mujoco.MjSpec, left: float, right: float, slope: float) -> None:
     """Add `left` and `right` (N m) to the friction of the swivels, as `edit` does."""
     if left == right == 0.0:
         return
     inverse_inertia = _inverse_inertias(spec)
     for caster, moment in zip(parts.CASTERS, (left, right), strict=True):
         joint = parts.named(spec.joints, f"{caster}_swivel", "joint")
-        own = _ratio(joint.solimp_friction[0]) if joint.frictionloss > 0.0 else 0.0
-        joint.frictionloss += moment
-        ratio = own + moment / creep * inverse_inertia[joint.name] / _rate(joint)
-        impedance = np.array(joint.solimp_friction)
-        impedance[0] = np.clip(ratio / (1.0 + ratio), LEAST, MOST)
-        joint.solimp_friction = impedance
+        own, total = joint.frictionloss, joint.frictionloss + moment
+        if moment > 0.0:
+            ratio = slope * inverse_inertia[joint.name] / _rate(joint)
+            ratio = (own * _ratio(joint.solimp_friction[0]) + moment * ratio) / total
+            impedance = np.array(joint.solimp_friction)
+            impedance[0] = np.clip(ratio / (1.0 + ratio), LEAST, MOST)
+            joint.solimp_friction = impedance
+        joint.frictionloss = total
 
 
 def _ratio(impedance: float) -> float:
@@ -77,7 +83,7 @@ def _of_one_side(values: Mapping[str, float], std: Mapping[str, float]) -> str:
 
 EFFECT = Effect(
     name="caster_friction",
-    parameters=(Parameter("moment", "N m", 0.2, 0.0, 10.0), CREEP),
+    parameters=(Parameter("moment", "N m", 0.2, 0.0, 10.0), SLOPE),
     signature="hysteresis when the swivel reverses its direction",
     source="a tight headset holds 0.1-0.5 N m; assumed",
     edit=edit,
@@ -89,7 +95,7 @@ ONE_SIDED = replace(
     parameters=(
         Parameter("left", "N m", 0.3, 0.0, 10.0),
         Parameter("right", "N m", 0.3, 0.0, 10.0),
-        CREEP,
+        SLOPE,
     ),
     signature="hysteresis when one swivel reverses its direction, and yaw while it holds",
     source="sizes assumed, as of both",
