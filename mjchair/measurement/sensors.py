@@ -6,6 +6,7 @@ that has to know a sensor asks here.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 from mjchair.model.rolling import RearAxle
@@ -80,6 +81,7 @@ SENSORS = {
 UNKNOWN = Sensor(unit="?", floor=1e-3, fault=0.1)
 
 
+@functools.cache  # a diagnosis asks some hundred thousand times
 def sensor(channel: str) -> Sensor:
     """The entry of a scalar channel, whatever prefix and component its name has."""
     name = channel.rsplit(".", 1)[0]
