@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from mjchair import cli
+from mjchair.diagnosis.data import unit_checks
 from mjchair.diagnosis.data.study_file import read_study
 from mjchair.errors import MjchairError
+from mjchair.model.rolling import RearAxle
 
 TIME = np.round(np.arange(0.0, 4.0, 0.02), 6)
 SIDES = ("left", "right")
@@ -125,8 +127,9 @@ CASES = {
             "columns": {"left_wheel_speed": coast()["left_wheel_speed"] / 6.0}
             | {"position.x": 1.2 * TIME, "position.y": 0.0 * TIME}
         },
-        r"left_wheel_speed looks like another unit: by it the wheel rolls 0\.\d+ m, and the chair "
-        r"gets 4\.\d m away; give rad/s, or the unit in its header, as in left_wheel_speed \[rpm\]",
+        r"left_wheel_speed looks like another unit: the wheels roll 0\.\d+ m by it, and the "
+        r"chair gets 4\.\d m away; give rad/s, or the unit in its header, as in left_wheel_speed "
+        r"\[rpm\]",
     ),
     "a velocity in km/h beside wheels": (
         {"columns": coast() | {"velocity.x": 3.5 * 0.3 * coast()["left_wheel_speed"]}},
@@ -324,6 +327,36 @@ def test_bad_studies_are_one_line_and_nothing_is_written(case, tmp_path, capsys)
     assert said.startswith("mjchair: ") and said.count("\n") == 1, said
     assert "Error" not in said and re.search(words, said), said
     assert not (tmp_path / "out").exists()
+
+
+def pivot(radius):
+    """A turn about the left wheel, seen by a marker at this distance (m) from it."""
+    return {
+        "left_wheel_speed": 0.001 * TIME,
+        "position.x": radius * np.sin(TIME),
+        "position.y": -radius * np.cos(TIME),
+    }
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        pivot(0.28),
+        pivot(0.9),
+        # a wheel's sensor that was lost after a second
+        {"left_wheel_speed": cut(np.full(TIME.size, 4.0), 0.0, 1.0), "position.x": 1.2 * TIME}
+        | {"position.y": 0.0 * TIME},
+        # on rollers
+        {"left_wheel_speed": 4.0 + TIME, "position.x": 0.001 * TIME, "position.y": 0.0 * TIME},
+        # places that were measured for a moment
+        {"left_wheel_speed": 4.0 + TIME, "position.x": cut(TIME, 0.0, 0.04)}
+        | {"position.y": cut(TIME, 0.0, 0.04)},
+    ],
+)
+def test_wheels_may_tell_other_ways_than_the_places(columns, tmp_path):
+    write(tmp_path / "study", columns)
+    (run,) = read_study(tmp_path / "study").runs
+    unit_checks.check(run.trial, RearAxle(left=0.3, right=0.3, track=0.56))
 
 
 @pytest.mark.parametrize(("more", "refused"), [(0.05, False), (0.5, True)])

@@ -32,6 +32,7 @@ OTHER_START = 1.0  # m/s, and the speed itself, by which a first speed is not th
 BIAS = 0.2  # rad/s, that a gyroscope may tell at rest (assumption)
 WAY = 0.5  # m by the wheels, below which it is not compared with the places
 FURTHER = 3.0  # times what its wheels roll that no chair gets away
+AWAY = 2.0  # m, from where it was, that a chair gets by more than turning about a wheel that stands
 # a rate in rad/s, deg/s, turns a second or a minute, over the same in another of these
 RATES = (6.0, 2.0 * np.pi, 60.0 / (2.0 * np.pi), DEGREES)
 LENGTHS = {"mm": 1e3, "cm": 1e2, "in": 39.37}  # units of a length that people use, a metre
@@ -63,6 +64,7 @@ def check(trial: Trial, axle: RearAxle) -> None:
     _compare_with_acceleration(trial, axle)
     _compare_with_way(trial, axle)
     _compare_speeds(trial, axle)
+    _compare_speeds_with_places(trial, axle)
     _check_places(trial)
 
 
@@ -289,27 +291,36 @@ def _compare_with_way(trial: Trial, axle: RearAxle) -> None:
 
 
 def _compare_speeds(trial: Trial, axle: RearAxle) -> None:
-    """A wheel's speed tells what its angle does, and not so little that the places contradict it.
-
-    Turns a minute under a header of deg/s are a sixth of it. A wheel may roll on the spot, as on
-    rollers, but a chair gets no further than its wheels roll.
-    """
+    """A wheel's speed tells what its angle does: turns a minute taken for deg/s are a sixth."""
     rolled = forward(trial, axle)
     for name in _speeds(trial):
         one, angle = rolled[name], name.replace("_speed", "_angle")
-        if angle in rolled and rolled[angle].time.size:
-            two = at(rolled[angle], one.time)
-            sizes = float(np.linalg.norm(one.values)), float(np.linalg.norm(two))
-            moves = max(sizes) > FORWARD * np.sqrt(two.size) and min(sizes) > 0.0
-            alike = float(one.values @ two) > ALIKE * sizes[0] * sizes[1]
-            ratio = sizes[0] / max(sizes[1], 1e-9)
-            if moves and alike and _is_of_units(ratio):
-                why = f"it tells {ratio:.2g} times what {angle} does"
-                _refuse(trial, name, "another unit", why, "rpm", "deg/s")
-        way = float(np.trapezoid(np.abs(one.values), one.time))
-        if _placed(trial) and (gone := _distance(trial)) > max(FURTHER * way, WAY):
-            why = f"by it the wheel rolls {way:.2g} m, and the chair gets {gone:.2g} m away"
+        if angle not in rolled or not rolled[angle].time.size:
+            continue
+        two = at(rolled[angle], one.time)
+        sizes = float(np.linalg.norm(one.values)), float(np.linalg.norm(two))
+        moves = max(sizes) > FORWARD * np.sqrt(two.size) and min(sizes) > 0.0
+        alike = float(one.values @ two) > ALIKE * sizes[0] * sizes[1]
+        if moves and alike and _is_of_units(sizes[0] / sizes[1]):
+            why = f"it tells {sizes[0] / sizes[1]:.2g} times what {angle} does"
             _refuse(trial, name, "another unit", why, "rpm", "deg/s")
+
+
+def _compare_speeds_with_places(trial: Trial, axle: RearAxle) -> None:
+    """A chair gets no further than its wheels roll, by the speeds, while these are measured.
+
+    Wheels may roll further, as on rollers, and a chair may turn about a wheel that stands.
+    """
+    rolled = [forward(trial, axle)[name] for name in _speeds(trial)]
+    rolled = [story for story in rolled if story.time.size]
+    if not rolled or not _placed(trial):
+        return
+    way = max(float(np.trapezoid(np.abs(story.values), story.time)) for story in rolled)
+    first = max(story.time[0] for story in rolled)
+    gone = _distance(trial, first, min(story.time[-1] for story in rolled))
+    if gone > max(FURTHER * way, AWAY):
+        why = f"the wheels roll {way:.2g} m by it, and the chair gets {gone:.2g} m away"
+        _refuse(trial, _speeds(trial)[0], "another unit", why, "rpm", "deg/s")
 
 
 def _is_of_units(ratio: float) -> bool:
@@ -317,11 +328,14 @@ def _is_of_units(ratio: float) -> bool:
     return any(1.0 / CLOSE < max(ratio, 1.0 / ratio) / by < CLOSE for by in RATES)
 
 
-def _distance(trial: Trial) -> float:
-    """How far the chair gets from where a run begins, m."""
+def _distance(trial: Trial, first: float, last: float) -> float:
+    """How far the chair gets from where it is at a time, until another (s), m."""
     x, y = (_mean(trial, f"position.{axis}") for axis in "xy")
-    across = at(y, x.time)
-    return float(np.hypot(x.values - x.values[0], across - across[0]).max())
+    during = (x.time >= first) & (x.time <= last)
+    if not during.any():
+        return 0.0
+    along, across = x.values[during], at(y, x.time)[during]
+    return float(np.hypot(along - along[0], across - across[0]).max())
 
 
 def _check_places(trial: Trial) -> None:
