@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from mjchair.effects.effect import Effect, Parameter
-from mjchair.effects.left_and_right import SIDES, size_words
+from mjchair.effects.left_and_right import size_words, wheel_words
 from mjchair.model import parts
 
 # MuJoCo's own slope on the shipped chair is 1.8; a fit begins there
@@ -76,9 +76,7 @@ def _inverse_inertias(spec: mujoco.MjSpec) -> dict[str, float]:
 
 
 def _of_one_side(values: Mapping[str, float], std: Mapping[str, float]) -> str:
-    sides = {side: values[side] for side in SIDES if values[side]}
-    caster = f"the {next(iter(sides))} caster" if len(sides) == 1 else "each caster"
-    return f"{size_words(sides, std, 1.0, '+.2f N m')}, {caster} by itself"
+    return f"{size_words(values, std, 1.0, '+.2f N m')}, {wheel_words(values, 'caster')}"
 
 
 EFFECT = Effect(

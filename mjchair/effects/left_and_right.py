@@ -1,7 +1,7 @@
-"""Words for what the rear wheels do not have alike: which wheel has it, or how much each has.
+"""Words for what two wheels do not have alike: which wheel has it, or how much each has.
 
-In: the values of an effect with the parameters `left` and `right`, and their standard errors. Out:
-words.
+In: the values of an effect with the parameters `left` and `right`, and their standard errors; what
+only shapes the effect may stand beside them. Out: words.
 """
 
 from __future__ import annotations
@@ -12,11 +12,14 @@ SIDES = ("left", "right")
 DIFFERENCE = "left less right"  # beside the parameters' standard errors, that of their difference
 
 
-def wheel_words(values: Mapping[str, float]) -> str:
-    """The rear wheel whose value is not zero, or each of them."""
-    sides = [side for side, value in values.items() if value]
-    wheel = f"the {sides[0]} rear wheel" if len(sides) == 1 else "each rear wheel"
-    return f"{wheel} by itself"
+def wheel_words(values: Mapping[str, float], wheel: str = "rear wheel") -> str:
+    """The wheel whose value is not zero, or each of them.
+
+    Args:
+      wheel: which kind of it.
+    """
+    sides = list(_sized_sides(values))
+    return f"the {sides[0]} {wheel} by itself" if len(sides) == 1 else f"each {wheel} by itself"
 
 
 def size_words(
@@ -33,7 +36,12 @@ def size_words(
         error = f" ± {per * std[name]:.2g}" if std.get(name) else ""
         return f"{name} {per * value:{digits}}{error} {unit}".rstrip()
 
-    said = [sized(side, value) for side, value in values.items() if value]
+    said = [sized(side, value) for side, value in _sized_sides(values).items()]
     if len(said) > 1:
         said.append(sized(DIFFERENCE, values["left"] - values["right"]))
     return ", ".join(said)
+
+
+def _sized_sides(values: Mapping[str, float]) -> dict[str, float]:
+    """Side -> its value, of those that are not zero."""
+    return {side: values[side] for side in SIDES if values.get(side)}

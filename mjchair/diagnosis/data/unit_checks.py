@@ -293,8 +293,8 @@ def _compare_with_way(trial: Trial, axle: RearAxle) -> None:
 def _compare_speeds(trial: Trial, axle: RearAxle) -> None:
     """A wheel's speed tells what its angle does: turns a minute taken for deg/s are a sixth."""
     rolled = forward(trial, axle)
-    for name in _speeds(trial):
-        one, angle = rolled[name], name.replace("_speed", "_angle")
+    for name, one in _by_speeds(trial, rolled).items():
+        angle = name.replace("_speed", "_angle")
         if angle not in rolled or not rolled[angle].time.size:
             continue
         two = at(rolled[angle], one.time)
@@ -311,8 +311,7 @@ def _compare_speeds_with_places(trial: Trial, axle: RearAxle) -> None:
 
     Wheels may roll further, as on rollers, and a chair may turn about a wheel that stands.
     """
-    rolled = [forward(trial, axle)[name] for name in _speeds(trial)]
-    rolled = [story for story in rolled if story.time.size]
+    rolled = [s for s in _by_speeds(trial, forward(trial, axle)).values() if s.time.size]
     if not rolled or not _placed(trial):
         return
     way = max(float(np.trapezoid(np.abs(story.values), story.time)) for story in rolled)
@@ -365,6 +364,11 @@ def _speeds(trial: Trial) -> list[str]:
     return [c for c in ("left_wheel_speed", "right_wheel_speed") if c in trial.channels]
 
 
+def _by_speeds(trial: Trial, rolled: Mapping[str, Story]) -> dict[str, Story]:
+    """What the speeds of the wheels tell, of what `forward` does."""
+    return {name: rolled[name] for name in _speeds(trial)}
+
+
 def _article(name: str) -> str:
     return "the difference of the wheels" if name == "wheels" else name
 
@@ -404,7 +408,7 @@ def _compare_with_acceleration(trial: Trial, axle: RearAxle) -> None:
 
 def _rolled(trial: Trial, axle: RearAxle) -> Story:
     """Speed of the axle's middle (m/s) by the wheels; by one alone, less the chair's turn."""
-    wheels = {n: s for n, s in forward(trial, axle).items() if n in _speeds(trial)}
+    wheels = _by_speeds(trial, forward(trial, axle))
     (name, one), *others = wheels.items()
     speeds = [one.values, *(at(other, one.time) for _, other in others)]
     if len(wheels) == 1 and "imu_gyro.z" in trial.channels:

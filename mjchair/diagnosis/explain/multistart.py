@@ -255,10 +255,12 @@ class MultiStart:
         start = replace(fitted.variant, offsets={})
         for _ in range(ANEW):
             again = made_anew(self.base.bench, start, fitted.track, reach=self._reach())
-            if again is None or fitted.total - again.total < rules.WORTH:
-                if again is not None and start is fitted.variant and not self._is_behind(again):
+            if again is None:
+                return fitted
+            if fitted.total - again.total < rules.WORTH:
+                if start is fitted.variant and not self._is_behind(again):
                     fitted.anew = again  # nobody need make it a second time
-                return _better(fitted, again) or fitted
+                return min(fitted, again, key=attrgetter("total"))
             fitted, start = again, again.variant
             if self._is_behind(fitted):
                 break
