@@ -135,6 +135,7 @@ def around_which(monkeypatch, fits, on_bound=(), count=None):
 
     monkeypatch.setattr(screening, "refit", refit)
     monkeypatch.setattr(screening.hypotheses, "terms", lambda _, h: h.starts)
+    monkeypatch.setattr(screening, "starting_variant", lambda *_: SimpleNamespace(terms=()))
     monkeypatch.setattr(screening, "_off_bounds", lambda terms, ended: terms)
     monkeypatch.setattr(screening, "on_bound", lambda k: k in on_bound)
     monkeypatch.setattr(screening, "replace", lambda variant, **_: variant)

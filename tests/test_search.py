@@ -10,10 +10,12 @@ from dataclasses import replace
 from types import SimpleNamespace
 from unittest import mock
 
+import linear_system
 import numpy as np
 import pytest
 
 from mjchair.diagnosis import decide, rules
+from mjchair.diagnosis.data.roughly_known import Nuisance
 from mjchair.diagnosis.explain import (
     alternatives,
     backward_elimination,
@@ -26,6 +28,7 @@ from mjchair.diagnosis.explain import (
     open_ended,
     probable,
     rivals,
+    screening,
     selection,
     shortlist,
     whole_beside,
@@ -35,8 +38,9 @@ from mjchair.diagnosis.explain import fits as fits_of_hypotheses
 from mjchair.diagnosis.explain.choice import Choice, Tried
 from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
+from mjchair.diagnosis.explain.screening import Found
 from mjchair.diagnosis.fit import bounded, nonlinear
-from mjchair.diagnosis.fit.column_ids import ParameterId
+from mjchair.diagnosis.fit.column_ids import ParameterId, RoughlyKnown
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.effects import air_drag, wind
 from mjchair.errors import MjchairError
@@ -125,12 +129,18 @@ def believe(monkeypatch, believable):
         monkeypatch.setattr(module, "believable", believable)
 
 
+def reduced(total):
+    """Linear algebra in which nothing is only roughly known."""
+    return SimpleNamespace(total=total, index=list, step=lambda _: (np.zeros(0), total))
+
+
 def searching():
     base = SimpleNamespace(
         bench=SimpleNamespace(simulator=SimpleNamespace(windows=[]), windows=np.arange(4)),
         nuisances={},
         plain=SimpleNamespace(total=2000.0, variant=Variant(()), chi2=np.full(4, 500.0)),
-        reduced=SimpleNamespace(total=2000.0),
+        reduced=reduced(2000.0),
+        system=SimpleNamespace(places={}),
         around=SimpleNamespace(track="as given", variant=Variant(())),
         found=None,
         best=None,
@@ -817,7 +827,7 @@ def test_what_is_roughly_known_hides_no_effect(fits, monkeypatch, offset, narrow
     looking.base.plain.variant = Variant((), offsets={"centre_x": offset})
     looking.base.starts = ()
     wide = looking.base.reduced
-    wide.narrowed = lambda wall: SimpleNamespace(total=26_000.0)
+    wide.narrowed = lambda wall: reduced(26_000.0)
     first = looking.fit(ONE)
     found, _ = alternatives.or_as_given(looking, (first, SimpleNamespace(exists=True)))
     assert found.hypothesis.keys == (best,)
@@ -846,7 +856,7 @@ def test_windows_in_which_a_chair_goes_another_way_hide_no_effect(
 
     def reduce(system, windows):
         by.append(windows)
-        return SimpleNamespace(total=400.0)
+        return reduced(400.0)
 
     motor = Hypothesis((MOTOR,), gain=90.0, score=90.0)
     monkeypatch.setattr(alternatives, "replace", put)
@@ -1150,6 +1160,50 @@ def test_a_second_start_that_ends_where_the_first_did_is_not_followed(
     )  # fmt: skip
     assert starts.fit().total == min(1300.0, 1300.0 if followed == 1 else second)
     assert len(seen) == followed
+
+
+def test_what_was_fitted_while_the_noise_was_sought_begins_where_it_ended(fits):
+    looking = searching()
+    ended = fit(1200.0, "rolling")
+    ended.variant = replace(ended.variant, offsets={"mass": 0.4})
+    looking.base.best = Found((ROLLING,), ended)
+    fits.answers["rolling", "track of rolling"] = fit(1190.0, "rolling")
+    assert looking.fit(ONE).fitted.total == 1190.0
+    assert fits.asked == [("rolling", "track of rolling")]
+
+
+def test_the_gap_that_a_fit_leaves_is_sought_once(monkeypatch):
+    looking, asked = searching(), []
+    monkeypatch.setattr(
+        fits_of_hypotheses, "gap_after", lambda _, fitted: asked.append(fitted) or len(asked)
+    )
+    one, other = fit(1200.0, "rolling"), fit(1200.0, "rolling")
+    assert [looking.gap_after(f) for f in (one, other, one)] == [1, 2, 1]
+
+
+@pytest.mark.parametrize(("share", "moved"), [(1.0, 1.0), (0.5, 0.55)])
+def test_a_fit_begins_with_what_is_roughly_known_where_its_effects_leave_it(share, moved):
+    """Beside the drag a mass at 0.1 belongs at 1; of a drag at its bound that is not known."""
+    rng = np.random.default_rng(5)
+    drag, mass = linear_system.start("air_drag"), RoughlyKnown("mass")
+    (area,) = drag.effect.fitted
+    drag = replace(drag, combine=lambda c: {"drag_area": min(area.change * c[0], area.high)})
+    J = 50.0 * rng.standard_normal((80, 2))
+    r = J @ np.array([0.9, 0.25 / area.change])
+    algebra = linear_system.system([mass, *drag.columns], J, r)
+    algebra = replace(algebra, nuisance=1, back=np.array([0.1]))
+    known = (Nuisance("mass", 1.0, "", edit=lambda spec, by: None),)
+    around = SimpleNamespace(variant=Variant(known, offsets={"mass": 0.1}))
+    base = SimpleNamespace(around=around, system=algebra)
+    small = bounded.reduce(algebra, [0])
+    hypothesis = hypotheses.weigh(small, [drag])
+    begun = screening.starting_variant(base, small, hypothesis, share)
+    assert begun.terms[0].values["drag_area"] == pytest.approx(share * 0.25, rel=1e-2)
+    assert begun.offsets["mass"] == pytest.approx(moved, rel=1e-2)
+    huge = bounded.reduce(replace(algebra, b=1000.0 * algebra.b), [0])
+    begun = screening.starting_variant(base, huge, hypothesis, share)
+    assert begun.terms[0].values["drag_area"] == area.high
+    assert begun.offsets == {"mass": 0.1}
 
 
 def test_ends_are_alike_within_a_tenth_of_a_standard_error():

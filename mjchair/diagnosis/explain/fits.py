@@ -42,6 +42,7 @@ class Fits:
       again: of some of them, the fit with everything made anew around it.
       begun: for each fit that began where one of more effects had ended: its effects, and that end.
       dropped: a line for each hypothesis that this chair cannot have.
+      gaps: that fits leave, each with its fit.
       near: the linear algebra that weighs; None: that of the base. latest: the last around a fit.
     """
 
@@ -53,6 +54,7 @@ class Fits:
         self.again: list[Tried] = []
         self.begun: list[tuple[tuple[Start, ...], Fitted]] = []
         self.dropped: list[str] = []
+        self.gaps: list[tuple[Fitted, Gap]] = []
         self.near = near_fit(base, base.found) if base.found else None
         self.latest: NearFit | None = None
 
@@ -212,8 +214,12 @@ class Fits:
         return with_form_errors(open_ended.with_least_sizes(self.base, fitted))
 
     def gap_after(self, fitted: Fitted) -> Gap:
-        """The gap that a fit leaves."""
-        return gap_after(self.base, fitted)
+        """The gap that a fit leaves, sought once."""
+        known = next((gap for other, gap in self.gaps if other is fitted), None)
+        if known is None:
+            known = gap_after(self.base, fitted)
+            self.gaps.append((fitted, known))
+        return known
 
     def _note(self, line: str) -> None:
         if line not in self.dropped:

@@ -16,7 +16,7 @@ from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import hypotheses
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.near_fit import NearFit
-from mjchair.diagnosis.explain.screening import Base, Say, gain, goes_far, silent
+from mjchair.diagnosis.explain.screening import Base, Say, gain, goes_far, silent, starting_variant
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ColumnId
 from mjchair.diagnosis.fit.nonlinear import Fitted, placed, refit
@@ -183,10 +183,14 @@ class MultiStart:
         base, reach = self.base, self._reach()
         if self.near is not None:
             return self.near.refit(self.hypothesis.starts, self.part, reach)
+        start, before = self._at(share), base.around.track
+        if base.best is not None and base.best.starts == self.hypothesis.starts and share == 1.0:
+            # it was fitted already, with the noise that stood before
+            start, before = base.best.fitted.variant, base.best.fitted.track
         return refit(
             base.bench,
-            self._at(share),
-            base.around.track,
+            start,
+            before,
             base.nuisances,
             part=self.part,
             reach=reach,
@@ -204,8 +208,7 @@ class MultiStart:
 
     def _at(self, share: float) -> Variant:
         """The chair with the effects at a share of the linear fit's coefficients."""
-        terms = hypotheses.terms(self.base.reduced, self.hypothesis, share)
-        return replace(self.base.around.variant, terms=terms)
+        return starting_variant(self.base, self.base.reduced, self.hypothesis, share)
 
     def _terms(self) -> tuple[Term, ...]:
         """The effects with the values that linear algebra promises."""

@@ -26,7 +26,7 @@ from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.fit.column_ids import ColumnId
-from mjchair.diagnosis.fit.nonlinear import Fitted, on_bound, refit
+from mjchair.diagnosis.fit.nonlinear import Fitted, moved, on_bound, refit
 from mjchair.diagnosis.fit.parameter_columns import nuisance_columns
 from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.fit.variant import Term, Variant
@@ -297,8 +297,8 @@ def _holding(
     """
     ended: list[Term] = []
     for h in options:
-        terms = _off_bounds(hypotheses.terms(reduced, h), ended)
-        start = replace(base.around.variant, terms=terms)
+        start = starting_variant(base, reduced, h)
+        start = replace(start, terms=_off_bounds(start.terms, ended))
         reach = rules.short_of(promised=reduced.total - h.gain, gain=h.gain)
         try:
             fitted = refit(
@@ -320,6 +320,24 @@ def _holding(
         made.append((fitted.total + h.penalty, found))
         ended += fitted.variant.terms
     return None
+
+
+def starting_variant(
+    base: Base, reduced: Reduced, hypothesis: Hypothesis, share: float = 1.0
+) -> Variant:
+    """The chair where a fit begins: at a share of what linear algebra makes of the effects.
+
+    What is only roughly known is where linear algebra has it beside them; where it asks for more of
+    an effect than there can be, it tells nothing of that.
+    """
+    around = base.around.variant
+    terms = hypotheses.terms(reduced, hypothesis, share)
+    if any(map(on_bound, terms)):
+        return replace(around, terms=terms)
+    beside = moved(around, base.system, reduced.step(reduced.index(hypothesis.columns))[0]).offsets
+    known = around.offsets
+    offsets = {n: (1.0 - share) * known.get(n, 0.0) + share * by for n, by in beside.items()}
+    return replace(around, offsets=offsets, terms=terms)
 
 
 def _off_bounds(terms: Sequence[Term], ended: Sequence[Term]) -> tuple[Term, ...]:

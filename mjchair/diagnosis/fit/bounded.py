@@ -65,6 +65,17 @@ class Reduced:
         """Their coefficients."""
         return self._settled(which)[1]
 
+    def step(self, which: Sequence[int]) -> tuple[Array, float]:
+        """Coefficients (p,) of nuisances and of these columns, zero elsewhere; chi2 with priors."""
+        settled, coefficients = self._settled(which)
+        sums, w = self.sums, list(which)
+        out = np.zeros(len(sums.b))
+        out[settled.rest] = settled.centre - settled.lean[:, w] @ coefficients
+        for i, side in settled.active:
+            out[i] = side * sums.wall[i] - sums.back[i]
+        out[sums.count + np.array(w, int)] = coefficients
+        return out, settled.total - float(settled.b[w] @ coefficients)
+
     def narrowed(self, wall: float) -> Reduced:
         """The same with a nearer wall (standard deviations) for every nuisance."""
         walls = np.minimum(self.sums.wall, np.where(np.isfinite(self.sums.wall), wall, np.inf))
@@ -248,15 +259,7 @@ def solve(system: System, windows: Windows, which: Sequence[int]) -> tuple[Array
     Args:
       which: places among all columns, none of a nuisance.
     """
-    n = system.nuisance
-    columns = [i - n for i in which]
-    settled, coefficients = reduce(system, windows)._settled(columns)
-    out = np.zeros(len(system.columns))
-    out[settled.rest] = settled.centre - settled.lean[:, columns] @ coefficients
-    for i, side in settled.active:
-        out[i] = side * settled.sums.wall[i] - system.back[i]
-    out[list(which)] = coefficients
-    return out, settled.total - float(settled.b[columns] @ coefficients)
+    return reduce(system, windows).step([i - system.nuisance for i in which])
 
 
 def solve_nuisances(system: System, windows: Windows, which: Sequence[int]) -> tuple[Array, float]:

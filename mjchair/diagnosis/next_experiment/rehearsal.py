@@ -105,6 +105,7 @@ class Rehearsal:
         self.manoeuvres = list(manoeuvres)
         self.chair = chair
         self.known: dict[object, mujoco.MjModel] = {}
+        self.threads = bench.simulator.threads
         self._plan(bench, setting)
         self.first = self._starts(chair)
         made = self._open_loop(chair, self.first)
@@ -129,12 +130,12 @@ class Rehearsal:
             for i, m in enumerate(self.manoeuvres)
         )
         study = replace(source, runs=runs)
-        self.simulator = WindowSimulator(study)
+        self.simulator = WindowSimulator(study, threads=self.threads)
         windows = [
             Window(i, 0, 0.0, 0.0, m.seconds, np.arange(runs[i].trial.time.size))
             for i, m in enumerate(self.manoeuvres)
         ]
-        self.longer = WindowSimulator(study, windows)
+        self.longer = WindowSimulator(study, windows, threads=self.threads)
 
     def model(self, chair: Version) -> mujoco.MjModel:
         """The chair's model, at the fine step: at the coarse one casters drift after a spin."""
@@ -208,15 +209,24 @@ class Rehearsal:
             seen.applied(simulator, w, o.predicted)
             for w, o in zip(simulator.windows, outcomes, strict=True)
         ]
-        aside = [
+        base, *aside = (
             self._predict([chair], [simulator.chair.moved(s, step) for s in states])[0]
-            for step in STEPS[:, None] * np.eye(len(SLOW))
-        ]
-        slow = [np.stack([a[i] - y for a in aside], axis=2) for i, y in enumerate(predicted)]
+            for step in (np.zeros(len(SLOW)), *np.diag(STEPS))
+        )
+        slow = [np.stack([a[i] - y for a in aside], axis=2) for i, y in enumerate(base)]
         return Track(states, predicted, slow, [o.trace for o in outcomes])
 
+    @cached_property
+    def shown(self) -> Column:
+        """What the channels of the chair show of every window, as `predict` tells it of others."""
+        return self.predict([self.chair])[0]
+
     def predict(self, chairs: Sequence[Version]) -> list[Column]:
-        """What each chair's channels show of every window, from the states of the track."""
+        """What each chair's channels show of every window, from the states of the track.
+
+        At the coarse step, for differences of two chairs: windows are too short for casters to
+        drift.
+        """
         return self._predict(chairs, self.track.states)
 
     @cached_property
@@ -239,9 +249,10 @@ class Rehearsal:
     def _predict(self, chairs: Sequence[Version], states: Sequence[State]) -> list[Column]:
         simulator = self.simulator
         different = {c.mechanics: c for c in chairs}
+        models = [simulator.coarsened(self.model(c)) for c in different.values()]
         jobs = [
-            Job(self.model(c), w, s)
-            for c in different.values()
+            Job(model, w, s)
+            for model in models
             for w, s in zip(simulator.windows, states, strict=True)
         ]
         outcomes = iter(simulator.run(jobs))

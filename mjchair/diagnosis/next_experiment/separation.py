@@ -117,7 +117,7 @@ def _add(
     m, p = len(rehearsal.manoeuvres), len(system.columns)
     G, b, c = np.zeros((m, p, p)), np.zeros((m, p)), np.zeros(m)
     for i, w in enumerate(simulator.windows):
-        miss = residual(rehearsal.track.predicted[i], theirs[i], simulator.channels)
+        miss = residual(rehearsal.shown[i], theirs[i], simulator.channels)
         nothing = np.zeros_like(miss)
         known = [columns[n][i] if n in columns else nothing for n in system.columns]
         window = eliminate_window(
@@ -156,7 +156,7 @@ def nuisance_answers(rehearsal: Rehearsal, chosen: Fitted) -> dict[ColumnId, Col
     Taken around the chosen chair; near it they are the same for every rival. The differences to a
     finer simulation have none: what the present data say of them is only summed out.
     """
-    middle, base = version(chosen), rehearsal.track.predicted
+    middle, base = version(chosen), rehearsal.shown
     channels = rehearsal.simulator.channels
     moving = [n for n in chosen.variant.nuisances if n.edit is not None]
     aside = []
@@ -210,7 +210,7 @@ def doubt_answer(rehearsal: Rehearsal, chosen: Fitted, effect: Effect) -> Column
     terms = (*middle.variant.terms, _typical(effect))
     beside = replace(middle, variant=replace(middle.variant, terms=terms))
     (column,) = rehearsal.predict([beside])
-    return _change(column, rehearsal.track.predicted, rehearsal.simulator.channels, 1.0)
+    return _change(column, rehearsal.shown, rehearsal.simulator.channels, 1.0)
 
 
 def doubt_column(bench: Bench, chosen: Fitted, effect: Effect) -> Column:
@@ -241,7 +241,7 @@ def outside_answers(
         for nth in range(len(which)):
             name = RoughlyKnown(f"outside:{w.index}:{nth}")
             if name not in answers:
-                answers[name] = [np.zeros_like(y) for y in rehearsal.track.predicted]
+                answers[name] = [np.zeros_like(y) for y in rehearsal.shown]
             answers[name][i] = courses[:, :, nth]
     nothing = [np.zeros_like(y) for y in chosen.track.predicted]
     return answers, dict.fromkeys(answers, nothing)
