@@ -9,6 +9,7 @@ from mjchair.effects import bearing_friction, caster_friction, rolling_resistanc
 from mjchair.effects.library import MECHANICAL, find, library, names
 from mjchair.errors import MjchairError
 from mjchair.model import parts
+from mjchair.simulation.initial import Initial, start
 from mjchair.tire import block
 
 CONTRACT = {
@@ -26,7 +27,7 @@ CONTRACT = {
     "load_sensitivity": {"exponent"},
     "tire_friction": {"factor"},
     "relaxation_length": {"length"},
-    "turning_scrub": {"moment"},
+    "turning_scrub": {"moment", "rate"},
     "caster_friction": {"moment", "slope"},
     "caster_trail": {"length"},
     "torque_gain": {"left", "right"},
@@ -293,6 +294,24 @@ def test_frictions_of_one_caster_add_up_and_a_little_changes_little():
     held = swivel_rate(spec, 0.4)
     effect.apply(spec, {"moment": 1e-6, "slope": 60.0})
     assert swivel_rate(spec, 0.4) == pytest.approx(held, rel=1e-3)
+
+
+def spinning_moment(moment, rate, yaw_rate):
+    """Moment (N m) of a rear tire of a chair that turns on the spot, against its turn."""
+    spec = mjchair.load_spec()
+    find("turning_scrub").apply(spec, {"moment": moment, "rate": rate})
+    model = spec.compile()
+    with mjchair.installed():
+        data = start(model, Initial(yaw_rate=yaw_rate))
+        mujoco.mj_step(model, data)
+    return -data.sensor("left_wheel_tire").data[3]
+
+
+@pytest.mark.parametrize(("rate", "yaw_rate"), [(0.3, 0.1), (0.3, -0.3), (0.05, 0.05), (0.02, 2.0)])
+def test_tires_resist_a_slow_turn_in_proportion_and_a_fast_one_in_full(rate, yaw_rate):
+    of_both = 4.0
+    more = spinning_moment(of_both, rate, yaw_rate) - spinning_moment(0.0, rate, yaw_rate)
+    assert more == pytest.approx(0.5 * of_both * np.tanh(yaw_rate / rate), rel=1e-4)
 
 
 def test_a_light_wind_is_told_from_still_air_and_what_goes_with_it():

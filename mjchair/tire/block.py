@@ -38,6 +38,7 @@ PNEUMATIC_TRAIL = 14  # m at zero slip, where the family has no aligning moment 
 SLIDE_SPEED = 15  # m/s, slip speed below which sliding at standstill keeps its peak
 RADIUS = 16  # m, unloaded
 LONGITUDINAL_FACTOR = 17  # 1, scales the slip stiffness along the heading alone; 0: 1
+TURNING_RATE = 18  # rad/s, over which the turning moment's sign is smoothed; 0: the law's own
 HEADER = 20  # the first coefficient
 
 # the road's own block, on the geom that a tire stands on: places of other friction and resistance

@@ -265,7 +265,8 @@ def step_tire(
     )
     my -= road.rolling_resistance * fz * radius * braked
     if p[block.TURNING_MOMENT] != 0.0:
-        mz -= p[block.TURNING_MOMENT] * math.tanh(motion.yaw_rate / TURNING_RATE)
+        rate = p[block.TURNING_RATE] or TURNING_RATE
+        mz -= p[block.TURNING_MOMENT] * math.tanh(motion.yaw_rate / rate)
 
     damping = p[block.DAMPING_TIME] / h
     total_x = fx - damping * c_kappa / sigma_x * (u - old.longitudinal)
