@@ -115,16 +115,28 @@ def explained(count, power, price):
     )
 
 
-def begun(monkeypatch, first):
-    """What the search begins with, where `first` is the best effect; None: with nothing."""
+def put(one, **changes):
+    """Like `replace`, of stubs."""
+    return SimpleNamespace(**vars(one) | changes)
+
+
+def begun(monkeypatch, first, power=1.0, windows=()):
+    """What the search begins with, where `first` is the best effect; None: with nothing.
+
+    Args:
+      power: of what shakes the chair. windows: of the study.
+    """
     monkeypatch.setattr(further_effects.noise_shown, "loudness", lambda bench: bench.power)
     monkeypatch.setattr(further_effects, "_first", lambda _: first)
-    monkeypatch.setattr(further_effects, "refit", lambda *_: "the fit")
-    monkeypatch.setattr(further_effects, "replace", lambda base, found: found)
+    monkeypatch.setattr(further_effects, "refit", lambda *_: first.fitted)
+    monkeypatch.setattr(
+        further_effects, "replace", lambda one, found=None, **changes: found or put(one, **changes)
+    )
     monkeypatch.setattr(further_effects, "with_noise", lambda base, bench: bench)
     monkeypatch.setattr(further_effects, "Fits", lambda found, _: found)
-    simulator = SimpleNamespace(windows=[])
-    base = SimpleNamespace(bench=SimpleNamespace(power=1.0, simulator=simulator), nuisances={})
+    simulator = SimpleNamespace(windows=windows)
+    bench = SimpleNamespace(power=power, simulator=simulator, windows=range(len(windows)))
+    base = SimpleNamespace(bench=bench, nuisances={})
     fits = SimpleNamespace(base=base, say=lambda _: None)
     found = further_effects.without_hidden(fits)
     return None if found is fits else found
@@ -171,5 +183,32 @@ def test_one_effect_is_what_the_search_begins_with(monkeypatch, start, power, ad
 
 def test_a_chair_that_is_hardly_shaken_is_not_looked_at_again(monkeypatch):
     monkeypatch.setattr(further_effects.noise_shown, "loudness", lambda bench: bench)
+    monkeypatch.setattr(further_effects.whole_sizes, "shimmies", lambda _: False)
     fits = SimpleNamespace(base=SimpleNamespace(bench=0.5 * LOUD))
     assert further_effects.without_hidden(fits) is fits
+
+
+@pytest.mark.parametrize(
+    ("shimmying", "apart"),
+    [
+        ((True, False), True),
+        ((True, True), False),  # no window tells the noise without a shimmy
+        ((False, False), False),
+    ],
+)
+def test_what_is_left_of_a_shimmy_is_no_noise_of_other_windows(monkeypatch, shimmying, apart):
+    """It hid a moment of 3.3 N m against turning beside a relaxation length of 0.09 m."""
+    one = explained(1, 0.5 * LOUD, 100.0)
+    one.starts = (WHOLE,)
+    asked = []
+
+    def noise(base, fitted, own, apart=False):
+        asked.append(apart)
+        return SimpleNamespace(power=0.5 * LOUD), 0.0
+
+    monkeypatch.setattr(further_effects, "_noise", noise)
+    monkeypatch.setattr(further_effects, "_further", lambda *_: None)
+    windows = [SimpleNamespace(shimmies=s) for s in shimmying]
+    found = begun(monkeypatch, one, 0.5 * LOUD, windows)
+    assert (found is not None) == any(shimmying)  # a chair that is hardly shaken
+    assert asked == [True] * apart

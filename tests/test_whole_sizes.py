@@ -92,7 +92,7 @@ def test_a_fit_from_a_size_ends_where_it_falls_too_far_behind(monkeypatch, besid
     monkeypatch.setattr(whole_sizes, "starts", lambda _: [scrub])
     told = SimpleNamespace(chi2=np.ones(1), variant=None, track=None)
     base = SimpleNamespace(
-        bench=SimpleNamespace(windows=np.arange(1)),
+        bench=SimpleNamespace(windows=np.arange(1), simulator=SimpleNamespace(windows=[])),
         plain=SimpleNamespace(total=6000.0, **vars(told)),
         around=SimpleNamespace(variant=None, track=Track([], [], [], [])),
         starts=[],
@@ -104,6 +104,36 @@ def test_a_fit_from_a_size_ends_where_it_falls_too_far_behind(monkeypatch, besid
         return
     assert list(whole_sizes.fits(base, other)) == list(whole_sizes.fits(base))
     assert reaches == [rules.reach_of_whole(best=1000.0, gain=5000.0), math.inf]
+
+
+@pytest.mark.parametrize(("swing", "as_measured"), [(0.3, True), (0.1, False)])
+def test_a_chair_that_does_not_shimmy_as_measured_is_no_measure_of_one_that_may(
+    monkeypatch, swing, as_measured
+):
+    """A patch of the floor that slowed the wheels as a shimmy did kept one from being followed."""
+    phase = np.linspace(0.0, 12.0 * np.pi, 60)
+    measured = np.column_stack([phase, 0.4 * np.sin(phase)])
+    measured[20:25, 1] = np.nan
+    simulator = SimpleNamespace(
+        channels=("heading", "left_caster_angle"),
+        windows=[SimpleNamespace(shimmies=True)],
+        measured=lambda window: measured,
+    )
+    shown = np.column_stack([phase, swing * np.sin(phase + 1.0)])
+    reaches = []
+    monkeypatch.setattr(whole_sizes, "chi2", lambda *_: 0.0)
+    monkeypatch.setattr(whole_sizes, "best_sizes", lambda *_: [Seen(500.0, Variant(()))])
+    monkeypatch.setattr(whole_sizes, "starts", lambda _: ["a start"])
+    monkeypatch.setattr(whole_sizes, "fit_from", lambda *args: reaches.append(args[-1]) or "a fit")
+    told = {"chi2": np.ones(1), "variant": None}
+    base = SimpleNamespace(
+        bench=SimpleNamespace(windows=np.arange(1), simulator=simulator),
+        plain=SimpleNamespace(total=6000.0, track=None, **told),
+    )
+    other = SimpleNamespace(total=1000.0, track=SimpleNamespace(predicted=[shown]), **told)
+    assert list(whole_sizes.fits(base, other)) == [("a start", "a fit")]
+    near = rules.reach_of_whole(best=1000.0, gain=5000.0)
+    assert reaches == [near if as_measured else math.inf]
 
 
 def test_sizes_are_looked_at_once_and_each_fit_begins_as_often_as_it_is_asked_for(monkeypatch):

@@ -20,6 +20,7 @@ from operator import attrgetter
 import numpy as np
 
 from mjchair.diagnosis import rules
+from mjchair.diagnosis.data.windows import calm
 from mjchair.diagnosis.explain import hypotheses, noise_shown, whole_sizes
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.fits import Fits, believable
@@ -69,24 +70,45 @@ def without_hidden(fits: Fits) -> Fits:
       fits: of which none is made yet; those that are made here stay in them.
     """
     base = fits.base
-    if noise_shown.loudness(base.bench) <= LOUD:
+    shimmies = whole_sizes.shimmies(base)
+    if noise_shown.loudness(base.bench) <= LOUD and not shimmies:
         return fits
     fits.say("what passes for noise")
     here = _first(fits)
     # small changes do not lead to an effect of a whole size: the search would not find it again
     whole = any(whole_sizes.parameter_of(s.effect) for s in here.starts)
-    done = whole and whole_sizes.shimmies(base)  # what it leaves of a shimmy is no further effect
-    while not done and len(here.starts) < rules.MOST and noise_shown.loudness(here.bench) > LOUD:
-        further = _further(base, here)
-        if further is None:
-            break
-        here = further
+    here = _beside_shimmy(base, here) if whole and shimmies else _grown(base, here)
     if not here.starts or not (whole or _is_quieter(here.bench, base.bench)):
         return fits
     quieter = with_noise(base, here.bench)
     columns = nuisances_of(base, here.fitted)
     fitted = refit(here.bench, here.fitted.variant, here.fitted.track, columns)
     return Fits(replace(quieter, found=Found(here.starts, fitted)), fits.say)
+
+
+def _grown(base: Base, here: Explained) -> Explained:
+    """The explanation with as many further effects as are more probable than noise."""
+    while len(here.starts) < rules.MOST and noise_shown.loudness(here.bench) > LOUD:
+        further = _further(base, here)
+        if further is None:
+            break
+        here = further
+    return here
+
+
+def _beside_shimmy(base: Base, here: Explained) -> Explained:
+    """The explanation of a shimmy with the noise that it leaves in windows without one.
+
+    What a fit leaves of a shimmy hangs on too little to be a further effect, and is no noise of the
+    sensors in other windows: there it would hide what is missing besides.
+    """
+    windows = base.bench.simulator.windows
+    if len(calm(windows, base.bench.windows)) == len(base.bench.windows):
+        return here
+    columns = nuisances_of(base, here.fitted)
+    bench = _noise(base, here.fitted, effects_of(base, here.fitted), apart=True)[0]
+    fitted = refit(bench, here.fitted.variant, here.fitted.track, columns)
+    return replace(here, fitted=fitted, bench=bench)
 
 
 def _first(fits: Fits) -> Explained:
@@ -218,9 +240,11 @@ def _left(base: Base, starts: tuple[Start, ...], fitted: Fitted) -> Explained:
     return Explained(starts=starts, fitted=fitted, bench=bench, price=deviance + _penalty(starts))
 
 
-def _noise(base: Base, fitted: Fitted, own: dict[ColumnId, Column]) -> tuple[Bench, float]:
-    known = nuisances_of(base, fitted)
-    return noise_shown.left_by(noise_shown.hushed(base.bench), fitted.track, known, own, given=True)
+def _noise(
+    base: Base, fitted: Fitted, own: dict[ColumnId, Column], apart: bool = False
+) -> tuple[Bench, float]:
+    known, bench = nuisances_of(base, fitted), noise_shown.hushed(base.bench)
+    return noise_shown.left_by(bench, fitted.track, known, own, given=True, apart=apart)
 
 
 def _around(base: Base, bench: Bench, fitted: Fitted) -> Reduced:

@@ -72,6 +72,7 @@ def left_by(
     nuisances: dict[ColumnId, Column],
     best: dict[ColumnId, Column],
     given: bool = False,
+    apart: bool = False,
 ) -> tuple[Bench, float]:
     """The bench with the noise that a hypothesis leaves, and its deviance.
 
@@ -82,11 +83,12 @@ def left_by(
 
     Args:
       best: columns of the hypothesis, in sizes worth finding. given: see
-        `noise_levels.least_powers`.
+        `noise_levels.least_powers`. apart: whether what it leaves of a shimmy is the noise of those
+        windows alone.
     """
     assert bench.process is not None
     broad = {key: [SIZES * window for window in column] for key, column in best.items()}
-    return _estimated(bench, here, bench.process, {**nuisances, **broad}, given)
+    return _estimated(bench, here, bench.process, {**nuisances, **broad}, given, apart)
 
 
 def loudness(bench: Bench) -> float:
@@ -136,23 +138,32 @@ def _estimated(
     shaking: Process,
     columns: dict[ColumnId, Column],
     given: bool = False,
+    apart: bool = False,
 ) -> tuple[Bench, float]:
     """The bench with the most probable levels, with the columns fitted along; the deviance."""
     simulator = bench.simulator
     windows = noise_levels.windows_of(
-        simulator, here, bench.whitener, shaking, columns, bench.windows
+        simulator, here, bench.whitener, shaking, columns, bench.windows, apart
     )
+    kinds = (False, True) if apart else (False,)  # whether a caster shimmies
     begin = Levels(
         parts=shaking.levels,
         wobbles=shaking.wobbles,
-        bands=np.ones((len(simulator.channels), len(EDGES))),
+        bands=np.ones((len(kinds) * len(simulator.channels), len(EDGES))),
     )
-    least = noise_levels.least_powers(bench.noise, simulator.channels, given)
+    least = np.vstack(
+        [
+            noise_levels.least_powers(
+                {c: n.where(shimmies) for c, n in bench.noise.items()}, simulator.channels, given
+            )
+            for shimmies in kinds
+        ]
+    )
     fixed = frozenset(noise_levels.known_parts(simulator.study))
     most = _most(simulator)
     shown = noise_levels.estimate(windows, begin, least, fixed, most=most)
     how_far = noise_levels.deviance(windows, shown)
-    shown = replace(shown, bands=shown.bands * _doubled(bench)[:, None])
+    shown = replace(shown, bands=shown.bands * np.tile(_doubled(bench), len(kinds))[:, None])
     noise = noise_levels.with_levels(bench.noise, simulator.channels, _steps(bench), shown)
     process = replace(shaking, levels=shown.parts, wobbles=shown.wobbles)
     return replace(bench, noise=noise, process=process), how_far

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mjchair.diagnosis import rules
+from mjchair.diagnosis.data.shimmy import CASTERS
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit import bounded
@@ -30,6 +31,7 @@ from mjchair.diagnosis.replay.window_states import Track, track
 from mjchair.effects.effect import Effect, Parameter
 from mjchair.errors import MjchairError
 
+SWINGS = 0.5  # of what measured casters swing
 LOOKED = 4  # windows, those that disagree most
 BESIDE = 0.1  # of a size, by which fits begin beside the one that was chosen
 BETWEEN = 2  # times that the best size is compared with the middles to its neighbours
@@ -55,16 +57,28 @@ def shimmies(base: Base) -> bool:
     return any(w.shimmies for w in base.bench.simulator.windows)
 
 
+def shimmies_as_measured(base: Base, here: Track) -> bool:
+    """Whether a chair's casters swing half as much as the measured ones, where these shimmy."""
+    simulator, power = base.bench.simulator, np.zeros(2)
+    at = [i for i, c in enumerate(simulator.channels) if c in CASTERS]
+    for i in (k for k in base.bench.windows if simulator.windows[k].shimmies):
+        both = simulator.measured(simulator.windows[i])[:, at], here.predicted[i][:, at]
+        measured, shown = (np.diff(y, axis=0) for y in both)
+        power += [np.nansum(measured**2), np.sum(shown[~np.isnan(measured)] ** 2)]
+    return bool(power[1] > SWINGS**2 * power[0])
+
+
 def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitted]]:
     """Fits of single effects that begin at whole sizes.
 
     Args:
-      other: a fit of other effects; a size that misses half of what it brings begins no fit.
+      other: a fit of other effects; a size that misses half of what it brings begins no fit. One
+        that does not shimmy where measured casters do is no measure of one that may.
     """
     windows = worst_windows(base, base.plain)
     nothing = chi2(base, base.plain.variant, base.plain.track, windows)
     most, reach = 0.0, np.inf
-    if other is not None:
+    if other is not None and (not shimmies(base) or shimmies_as_measured(base, other.track)):
         most = nothing - chi2(base, other.variant, other.track, windows)
         reach = rules.reach_of_whole(best=other.total, gain=gain(base, other))
 

@@ -50,7 +50,8 @@ class Levels:
     Attributes:
       parts: part -> (runs,) standard deviations, N or N m (1 of PERSON).
       wobbles: channel -> amplitude, SI.
-      bands: (channels, bands) power over that of the first guess.
+      bands: (channels, bands) power over that of the first guess; (2 channels, bands) where windows
+        in which a caster shimmies have their own, which are the second half.
     """
 
     parts: Mapping[Part, Array]
@@ -65,7 +66,8 @@ class WindowColumns:
     Attributes:
       run: index. r: (n,). J: (n, p). Z: (n, k), with standard deviations of their prior put in.
       pulses: force -> white answers (n, m), and correlations of every part (m, m).
-      wobbles: channel -> (n, 2). band: (n,) index of each row's band. channel: (n,).
+      wobbles: channel -> (n, 2). band: (n,) index of each row's band. channel: (n,) place of its
+        powers in `Levels.bands`.
       tells: (n,) whether a row tells its band's power.
     """
 
@@ -88,9 +90,15 @@ def windows_of(
     process: Process,
     columns: Mapping[ColumnId, Column],
     which: Sequence[int] | NDArray[np.int64],
+    apart: bool = False,
 ) -> list[WindowColumns]:
-    """The windows `which` with columns (ids -> (rows, channels) a window), each of unit prior."""
+    """The windows `which` with columns (ids -> (rows, channels) a window), each of unit prior.
+
+    Args:
+      apart: whether sensors have powers of their own in windows in which a caster shimmies.
+    """
     out = []
+    own = len(simulator.channels) if apart else 0
     for i in (int(w) for w in which):
         miss = residual(
             simulator.measured(simulator.windows[i]), track.predicted[i], simulator.channels
@@ -115,7 +123,7 @@ def windows_of(
                 },
                 wobbles={c: process.wobble_columns(i, c, whitener) for c in process.encoders},
                 band=np.minimum(np.searchsorted(EDGES, frequency, side="right"), len(EDGES) - 1),
-                channel=whitener.channel[i],
+                channel=whitener.channel[i] + (own if simulator.windows[i].shimmies else 0),
                 tells=frequency > LEAST_HZ,
             )
         )
@@ -341,18 +349,26 @@ def with_levels(
     Args:
       steps: (channels,), s between samples.
     """
-    edges = np.r_[0.0, EDGES]
+    ratios = levels.bands.reshape(-1, len(channels), len(EDGES))
     out = {}
-    for channel, step, ratio in zip(channels, steps, levels.bands, strict=True):
+    for k, (channel, step) in enumerate(zip(channels, steps, strict=True)):
         known = noise[channel]
-        middle = 0.5 * (edges[:-1] + edges[1:])
-        power = known.power(middle, float(step)) * ratio
-        # the share of each band in the variance of the samples
-        width = np.diff(edges) * 2.0 * float(step)
-        more = float((np.maximum(power - known.white**2, 0.0) * np.minimum(width, 1.0)).sum())
-        slow = max(float(np.sqrt(more)), 0.0)
-        out[channel] = replace(known, slow=slow, bands=tuple(float(p) for p in power))
+        out[channel] = _with_bands(known, float(step), ratios[0, k])
+        if len(ratios) > 1:
+            shimmying = replace(known.where(True), shimmying=None)
+            own = _with_bands(shimmying, float(step), ratios[1, k])
+            out[channel] = replace(out[channel], shimmying=own)
     return out
+
+
+def _with_bands(known: Noise, step: float, ratio: Array) -> Noise:
+    """A noise whose power in each band is multiplied by a ratio (bands,)."""
+    edges = np.r_[0.0, EDGES]
+    power = known.power(0.5 * (edges[:-1] + edges[1:]), step) * ratio
+    # the share of each band in the variance of the samples
+    width = np.diff(edges) * 2.0 * step
+    more = float((np.maximum(power - known.white**2, 0.0) * np.minimum(width, 1.0)).sum())
+    return replace(known, slow=max(float(np.sqrt(more)), 0.0), bands=tuple(map(float, power)))
 
 
 def least_powers(noise: Mapping[str, Noise], channels: Sequence[str], given: bool = False) -> Array:

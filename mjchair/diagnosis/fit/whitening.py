@@ -42,7 +42,7 @@ class Whitener:
             for name, n, k, frequency in zip(simulator.channels, counts, kept, at, strict=True):
                 if (n, k) not in known:
                     known[n, k] = cosines(int(n), k)
-                power = noise[name].power(frequency, span / max(int(n), 1))
+                power = noise[name].where(w.shimmies).power(frequency, span / max(int(n), 1))
                 waves.append(known[n, k] / np.sqrt(power))
             self.there.append(there)
             self.waves.append(waves)

@@ -35,6 +35,7 @@ class Noise:
       source: where the numbers come from.
       bands: power that the study itself shows below each of EDGES (SI squared, as of samples with
         that variance); empty: that of white and correlated noise.
+      shimmying: what stands for it in windows in which a caster shimmies; None: it itself.
     """
 
     white: float
@@ -42,6 +43,11 @@ class Noise:
     time: float
     source: str
     bands: tuple[float, ...] = ()
+    shimmying: Noise | None = None
+
+    def where(self, shimmies: bool) -> Noise:
+        """The noise of a window in which a caster shimmies, or in which none does."""
+        return self.shimmying if shimmies and self.shimmying is not None else self
 
     @property
     def total(self) -> float:

@@ -140,7 +140,9 @@ def track(
       only: windows to fit; the others stay as they were `before`. None: all.
     """
     coarse = simulator.coarsened(model)
-    white = np.array([noise[c].total for c in simulator.channels])
+    white = np.array(
+        [[noise[c].where(w.shimmies).total for c in simulator.channels] for w in simulator.windows]
+    )
     errors = errors or SensorErrors(simulator.channels)
     count = len(simulator.windows)
     # one after another along the runs where each begins in what the one before leaves
@@ -176,7 +178,7 @@ def track(
             for i, outcome in _traced(simulator, model, moved).items():
                 w = simulator.windows[i]
                 shown = errors.applied(simulator, w, outcome.predicted)
-                search[i].judge(_size(simulator, w, shown, white), shown, outcome.trace)
+                search[i].judge(_size(simulator, w, shown, white[i]), shown, outcome.trace)
             for i, s in search.items():
                 states[i], predicted[i], traces[i] = s.best, s.predicted, s.trace
                 if s.touchy:
@@ -189,9 +191,14 @@ def track(
 def _most(
     simulator: WindowSimulator, before: Track, members: Collection[int], white: Array
 ) -> float:
-    """Misfit of windows above which the states of a chair near by are not sought any further."""
-    known = sum(_size(simulator, simulator.windows[i], before.predicted[i], white) for i in members)
-    samples = sum(simulator.windows[i].rows.size for i in members) * len(white)
+    """Misfit of windows above which the states of a chair near by are not sought any further.
+
+    Args:
+      white: (windows, channels) standard deviations.
+    """
+    windows = simulator.windows
+    known = sum(_size(simulator, windows[i], before.predicted[i], white[i]) for i in members)
+    samples = sum(windows[i].rows.size for i in members) * len(simulator.channels)
     return HOPELESS * max(known, float(samples))
 
 
@@ -280,7 +287,7 @@ def _fit_round(
         s, w = search[i], simulator.windows[i]
         shown = errors.applied(simulator, w, outcome.predicted)
         before, promised = s.size, s.promise
-        if s.judge(_size(simulator, w, shown, white), shown, outcome.trace):
+        if s.judge(_size(simulator, w, shown, white[i]), shown, outcome.trace):
             good.append(i)
             s.fresh = not kept or (s.touchy and not before - s.size > ENOUGH * promised)
             if s.fresh:
@@ -298,7 +305,7 @@ def _fit_round(
             slow[i] = answers
     for i in good:
         s = search[i]
-        change, s.promise = _step(simulator, i, s, slow[i], white)
+        change, s.promise = _step(simulator, i, s, slow[i], white[i])
         s.calm = s.promise <= CALM and not _stands(simulator, i, s.state)
         if s.calm:
             continue
