@@ -8,6 +8,7 @@ import pytest
 
 from mjchair.diagnosis.replay import window_states
 from mjchair.diagnosis.replay.chair_state import SLOW, STEPS
+from mjchair.diagnosis.replay.noise import Noise
 
 CHANNELS = ("left_wheel_angle", "imu_gyro.z")
 WHITE = np.array([0.01, 0.02])
@@ -192,11 +193,11 @@ def test_the_states_of_a_hopeless_chair_are_not_sought(monkeypatch):
     monkeypatch.setattr(window_states, "_fit_round", one)
     simulator = SimpleNamespace(
         channels=CHANNELS,
-        windows=[SimpleNamespace(index=0, rows=np.arange(4))],
+        windows=[SimpleNamespace(index=0, rows=np.arange(4), shimmies=False)],
         coarsened=lambda model: model,
     )
     errors = SimpleNamespace(applied=lambda _simulator, _window, predicted: predicted)
-    noise = dict.fromkeys(CHANNELS, SimpleNamespace(total=1.0))
+    noise = dict.fromkeys(CHANNELS, Noise(1.0, 0.0, 1.0, "given"))
     limit = window_states.HOPELESS * 8.0  # samples: the chair before misses none
     for size, expected in ((0.9 * limit, window_states.ROUNDS), (1.1 * limit, 1)):
         rounds.clear()
