@@ -43,6 +43,7 @@ from mjchair.diagnosis.fit import bounded, nonlinear
 from mjchair.diagnosis.fit.column_ids import ParameterId, RoughlyKnown
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.effects import air_drag, wind
+from mjchair.effects.library import find
 from mjchair.errors import MjchairError
 
 
@@ -569,7 +570,9 @@ def test_both_sides_are_freed_by_a_fit_where_linear_algebra_says_nothing(
 ):
     """A left wheel 1.27 mm smaller was a right one 1.27 +- 0.03 mm larger, beside a patch."""
     parameter = SimpleNamespace(neutral=0.0)
-    sides = SimpleNamespace(key="wheel", seeds=None, common=1.0, parameter=lambda _: parameter)
+    sides = SimpleNamespace(
+        key="wheel", seeds=None, common=1.0, fitted=(), parameter=lambda _: parameter
+    )
     right, both = (
         SimpleNamespace(effect=sides, group="wheel", free=free, columns=free)
         for free in (("right",), ("left", "right"))
@@ -1206,6 +1209,34 @@ def test_a_fit_begins_with_what_is_roughly_known_where_its_effects_leave_it(shar
     assert begun.offsets == {"mass": 0.1}
 
 
+@pytest.mark.parametrize(
+    ("name", "free", "counted"),
+    [
+        ("turning_scrub", ("moment", "rate"), 1),
+        ("caster_friction", ("moment", "slope"), 1),
+        ("surface_patch", ("x", "y", "radius", "coefficient"), 4),  # a place is looked for
+        ("wind", ("x", "drag_area"), 2),  # at several drag areas
+        ("toe", ("symmetric", "asymmetric"), 2),
+    ],
+)
+def test_what_only_shapes_an_effect_is_no_further_number(name, free, counted):
+    """A scrub that a single turn shows came behind two unequal wheels once its rate was free."""
+    one = SimpleNamespace(effect=find(name), free=free, columns=free)
+    weighed = hypotheses.priced([one], 900.0)
+    assert weighed.free == counted
+    assert weighed.score - weighed.prior == pytest.approx(900.0 - rules.PENALTY * counted)
+
+
+def test_what_data_do_not_tell_of_a_shape_is_known_to_its_bounds():
+    term = Term(find("turning_scrub"), {"moment": 2.0, "rate": 0.05}, ("moment", "rate"))
+    (moment, _), (rate, p) = term.parameters
+    told = SimpleNamespace(variant=Variant((), terms=(term,)), std={moment: 0.2, rate: 2.6e8})
+    with mock.patch.object(fits_of_hypotheses, "replace", put):
+        std = fits_of_hypotheses.with_form_errors(told).std
+    assert std[rate] == p.high - p.low
+    assert std[moment] == pytest.approx(np.hypot(0.2, 2.0 * rules.SIZE_BY_FORM))
+
+
 def test_ends_are_alike_within_a_tenth_of_a_standard_error():
     term = Term(air_drag.EFFECT, {"drag_area": 0.5}, ("drag_area",))
     ((key, _),) = term.parameters
@@ -1234,7 +1265,7 @@ def test_another_form_of_an_effect_stands_in_where_the_first_leaves_a_gap(
 ):
     wave, whole = (
         SimpleNamespace(
-            effect=SimpleNamespace(key="motion", common=1.0),
+            effect=SimpleNamespace(key="motion", common=1.0, fitted=()),
             free=tuple("abcdef"[:count]),
             columns=tuple("abcdef"[:count]),
         )

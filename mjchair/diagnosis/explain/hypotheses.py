@@ -74,8 +74,8 @@ class Hypothesis:
 
     @property
     def free(self) -> int:
-        """Number of free parameters."""
-        return sum(len(s.free) for s in self.starts)
+        """Number of free parameters that must bring something; see `_counted`."""
+        return sum(map(_counted, self.starts))
 
 
 def weigh(reduced: Reduced, starts: Sequence[Start]) -> Hypothesis:
@@ -89,9 +89,23 @@ def weigh(reduced: Reduced, starts: Sequence[Start]) -> Hypothesis:
 
 def priced(starts: Sequence[Start], gain: float) -> Hypothesis:
     """The hypothesis with this gain (chi2), its score less what its parameters must bring."""
-    free = sum(len(s.free) for s in starts)
+    free = sum(map(_counted, starts))
     weighed = Hypothesis(tuple(starts), gain, gain - PENALTY * free)
     return replace(weighed, score=weighed.score + weighed.prior)
+
+
+def _counted(start: Start) -> int:
+    """Number of free parameters, but for those that only shape an effect of a usual shape.
+
+    Where data do not tell such a number, it brings nothing and costs nothing, and where they do, it
+    is told beside the size. At the price of a further number, a scrub that a single turn shows came
+    behind two unequal wheels. A place or a time is looked for everywhere, and counts.
+    """
+    effect = start.effect
+    shapes = [p for p in effect.fitted if not p.sized and p.name in start.free]
+    if not shapes or effect.seeds or effect.place or effect.wave:
+        return len(start.free)
+    return len(start.free) - len(shapes)
 
 
 def physical(reduced: Reduced, hypothesis: Hypothesis) -> bool:
