@@ -372,3 +372,9 @@ def test_rolling_resistance_takes_away_what_the_tires_have_and_no_more():
     left = [parts.tire_geom(spec, w).userdata[PLACE] for w in (*parts.REAR, *parts.CASTERS)]
     assert min(left) == 0.0
     assert sum(left) == pytest.approx(2.0 * (0.015 - 0.010))
+
+
+def test_an_effect_of_no_sensor_has_no_channel():
+    """`mjchair hide caster_friction:slope=0.01` hid the usual size."""
+    with pytest.raises(MjchairError, match="its numbers are moment, slope"):
+        find("caster_friction", "slope=0.01")

@@ -117,7 +117,7 @@ def find(name: str, channel: str | None = None) -> Effect:
     """The effect of that name; a sensor's with its channel. An old name is warned of.
 
     Raises:
-      MjchairError: unknown, or a sensor effect without a channel.
+      MjchairError: unknown, a sensor effect without a channel, or another one with it.
     """
     if name in RENAMED:
         new = RENAMED[name]
@@ -132,5 +132,10 @@ def find(name: str, channel: str | None = None) -> Effect:
         raise MjchairError(f"{channel} has no {name}; MuJoCo delays no sensor of a tire")
     for effect in MECHANICAL:
         if effect.name == name:
+            if channel:
+                raise MjchairError(
+                    f"{name} is of no sensor, so {channel!r} behind its name says nothing; its "
+                    f"numbers are {', '.join(p.name for p in effect.parameters)}"
+                )
             return effect
     raise MjchairError(f"unknown effect {name!r}" + nearest(name, names()))
