@@ -91,8 +91,12 @@ def test_a_fit_from_a_size_ends_where_it_falls_too_far_behind(monkeypatch, besid
     scrub = SimpleNamespace(effect=find("turning_scrub"))
     monkeypatch.setattr(whole_sizes, "starts", lambda _: [scrub])
     told = SimpleNamespace(chi2=np.ones(1), variant=None, track=None)
+    # the second window is held out
+    windows = [SimpleNamespace(shimmies=False), SimpleNamespace(shimmies=True)]
     base = SimpleNamespace(
-        bench=SimpleNamespace(windows=np.arange(1), simulator=SimpleNamespace(windows=[])),
+        bench=SimpleNamespace(
+            windows=np.arange(1), simulator=SimpleNamespace(windows=windows, channels=())
+        ),
         plain=SimpleNamespace(total=6000.0, **vars(told)),
         around=SimpleNamespace(variant=None, track=Track([], [], [], [])),
         starts=[],

@@ -89,9 +89,8 @@ def weigh(reduced: Reduced, starts: Sequence[Start]) -> Hypothesis:
 
 def priced(starts: Sequence[Start], gain: float) -> Hypothesis:
     """The hypothesis with this gain (chi2), its score less what its parameters must bring."""
-    free = sum(map(_counted, starts))
-    weighed = Hypothesis(tuple(starts), gain, gain - PENALTY * free)
-    return replace(weighed, score=weighed.score + weighed.prior)
+    weighed = Hypothesis(tuple(starts), gain, gain)
+    return replace(weighed, score=gain - weighed.cost + weighed.prior)
 
 
 def _counted(start: Start) -> int:

@@ -183,10 +183,12 @@ class MultiStart:
         base, reach = self.base, self._reach()
         if self.near is not None:
             return self.near.refit(self.hypothesis.starts, self.part, reach)
-        start, before = self._at(share), base.around.track
-        if base.best is not None and base.best.starts == self.hypothesis.starts and share == 1.0:
+        best = base.best
+        if best is not None and best.starts == self.hypothesis.starts and share == 1.0:
             # it was fitted already, with the noise that stood before
-            start, before = base.best.fitted.variant, base.best.fitted.track
+            start, before = best.fitted.variant, best.fitted.track
+        else:
+            start, before = self._at(share), base.around.track
         return refit(
             base.bench,
             start,

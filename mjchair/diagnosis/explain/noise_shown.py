@@ -26,7 +26,6 @@ from mjchair.diagnosis.fit.parameter_columns import sensor_column
 from mjchair.diagnosis.fit.process import NAMED, Part, Process
 from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.measured_motion import motions
-from mjchair.diagnosis.replay.noise import EDGES
 from mjchair.diagnosis.replay.pulses import Force, Pulse
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.diagnosis.replay.window_states import Track
@@ -145,20 +144,11 @@ def _estimated(
     windows = noise_levels.windows_of(
         simulator, here, bench.whitener, shaking, columns, bench.windows, apart
     )
-    kinds = (False, True) if apart else (False,)  # whether a caster shimmies
-    begin = Levels(
-        parts=shaking.levels,
-        wobbles=shaking.wobbles,
-        bands=np.ones((len(kinds) * len(simulator.channels), len(EDGES))),
-    )
-    least = np.vstack(
-        [
-            noise_levels.least_powers(
-                {c: n.where(shimmies) for c, n in bench.noise.items()}, simulator.channels, given
-            )
-            for shimmies in kinds
-        ]
-    )
+    kinds = [bench.noise]
+    if apart:
+        kinds.append({c: known.where(True) for c, known in bench.noise.items()})
+    least = np.vstack([noise_levels.least_powers(k, simulator.channels, given) for k in kinds])
+    begin = Levels(parts=shaking.levels, wobbles=shaking.wobbles, bands=np.ones(least.shape))
     fixed = frozenset(noise_levels.known_parts(simulator.study))
     most = _most(simulator)
     shown = noise_levels.estimate(windows, begin, least, fixed, most=most)

@@ -58,14 +58,14 @@ def shimmies(base: Base) -> bool:
 
 
 def shimmies_as_measured(base: Base, here: Track) -> bool:
-    """Whether a chair's casters swing half as much as the measured ones, where these shimmy."""
+    """Whether a chair's casters swing half as much as the measured ones, wherever these shimmy."""
     simulator, power = base.bench.simulator, np.zeros(2)
     at = [i for i, c in enumerate(simulator.channels) if c in CASTERS]
     for i in (k for k in base.bench.windows if simulator.windows[k].shimmies):
         both = simulator.measured(simulator.windows[i])[:, at], here.predicted[i][:, at]
         measured, shown = (np.diff(y, axis=0) for y in both)
         power += [np.nansum(measured**2), np.sum(shown[~np.isnan(measured)] ** 2)]
-    return bool(power[1] > SWINGS**2 * power[0])
+    return bool(power[1] >= SWINGS**2 * power[0])
 
 
 def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitted]]:
@@ -78,7 +78,7 @@ def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitte
     windows = worst_windows(base, base.plain)
     nothing = chi2(base, base.plain.variant, base.plain.track, windows)
     most, reach = 0.0, np.inf
-    if other is not None and (not shimmies(base) or shimmies_as_measured(base, other.track)):
+    if other is not None and shimmies_as_measured(base, other.track):
         most = nothing - chi2(base, other.variant, other.track, windows)
         reach = rules.reach_of_whole(best=other.total, gain=gain(base, other))
 

@@ -214,12 +214,13 @@ class Rehearsal:
             for step in (np.zeros(len(SLOW)), *np.diag(STEPS))
         )
         slow = [np.stack([a[i] - y for a in aside], axis=2) for i, y in enumerate(base)]
-        return Track(states, predicted, slow, [o.trace for o in outcomes])
+        return Track(states, predicted, slow, [o.trace for o in outcomes], base, seen)
 
-    @cached_property
+    @property
     def shown(self) -> Column:
         """What the channels of the chair show of every window, as `predict` tells it of others."""
-        return self.predict([self.chair])[0]
+        assert self.track.coarse is not None
+        return self.track.coarse
 
     def predict(self, chairs: Sequence[Version]) -> list[Column]:
         """What each chair's channels show of every window, from the states of the track.
