@@ -555,7 +555,8 @@ def test_windows_are_short_where_a_caster_shimmies():
     for windows in calm_ones:
         assert max(w.last - w.first for w in windows) > 1.9
         assert not any(w.shimmies for w in windows)
-    assert max(w.last - w.first for w in shaky) < 0.8
+    # six swings of 1/14 s
+    assert max(w.last - w.first for w in shaky) < 0.5
     inside = [w for w in shaky if w.shimmies]
     assert 2.0 < inside[0].first < 3.1 and 4.9 < inside[-1].last < 6.0
     assert calm(shaky, range(len(shaky))) == [k for k, w in enumerate(shaky) if not w.shimmies]

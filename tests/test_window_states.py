@@ -103,7 +103,7 @@ def test_a_step_that_promised_much_and_failed_is_made_anew_with_small_changes(mo
     worse = SimpleNamespace(predicted=None, trace={})
     monkeypatch.setattr(window_states, "_traced", lambda *_: {0: worse, 1: worse})
     monkeypatch.setattr(window_states, "_size", lambda *_: 9.0)
-    monkeypatch.setattr(window_states, "_answers", answers)
+    monkeypatch.setattr(window_states, "answers", answers)
     monkeypatch.setattr(window_states, "_step", lambda *_: (np.ones(len(SLOW)), 5.0))
     chair = SimpleNamespace(stands=lambda _: False, moved=lambda state, change: change)
     simulator = SimpleNamespace(windows=[None, None], chair=chair, rolls=[True, True])
@@ -140,7 +140,7 @@ def test_answers_are_made_anew_where_a_step_brings_less_than_they_promise(
     shown = SimpleNamespace(predicted=None, trace={})
     monkeypatch.setattr(window_states, "_traced", lambda *_: {0: shown})
     monkeypatch.setattr(window_states, "_size", lambda *_: size)
-    monkeypatch.setattr(window_states, "_answers", answers)
+    monkeypatch.setattr(window_states, "answers", answers)
     monkeypatch.setattr(window_states, "_step", lambda *_: (np.ones(len(SLOW)), 5.0))
     chair = SimpleNamespace(stands=lambda _: False, moved=lambda state, change: change)
     simulator = SimpleNamespace(windows=[None], chair=chair, rolls=[True])
@@ -152,10 +152,10 @@ def test_answers_are_made_anew_where_a_step_brings_less_than_they_promise(
     assert asked == ([0] if anew else [])
 
 
-@pytest.mark.parametrize("placed", [True, False])
-def test_what_a_window_cannot_tell_is_not_simulated(placed, monkeypatch):
+@pytest.mark.parametrize(("placed", "shimmies"), [(True, False), (False, True)])
+def test_what_a_window_cannot_tell_is_not_simulated(placed, shimmies, monkeypatch):
     """The prior of a position that no channel sees holds it."""
-    seen = np.r_[placed, placed, True, True, True, False, False]
+    seen = np.r_[placed, placed, True, True, True, True, False]
     monkeypatch.setattr(window_states.first_state, "observed", lambda _: seen)
 
     def run(jobs):  # each channel shows the sum of the state
@@ -163,14 +163,16 @@ def test_what_a_window_cannot_tell_is_not_simulated(placed, monkeypatch):
 
     simulator = SimpleNamespace(
         chair=SimpleNamespace(moved=lambda state, step: state + step),
-        windows=[SimpleNamespace(run=0)],
+        windows=[SimpleNamespace(run=0, shimmies=shimmies)],
         study=SimpleNamespace(runs=[None]),
         run=run,
     )
     errors = SimpleNamespace(applied=lambda _simulator, _window, predicted: predicted)
     states = {0: np.ones(len(SLOW))}
-    (answers,) = window_states._answers(simulator, None, errors, states, 0.5).values()
-    expected = np.where(np.arange(len(SLOW)) < 2, STEPS * placed, STEPS)  # a caster is told later
+    (answers,) = window_states.answers(simulator, None, errors, states, 0.5).values()
+    # a caster that is not seen is told later; how one swings, only where it is seen to shimmy
+    told = [placed, placed, True, True, True, True, True, shimmies, False, shimmies, False]
+    expected = np.where(told, STEPS, 0.0)
     np.testing.assert_allclose(answers, np.broadcast_to(expected, (4, 2, len(SLOW))))
 
 

@@ -1,10 +1,13 @@
 """Where a measured caster shimmies: it swings back and forth many times a second.
 
-In: a run's trial. Out: the stretches in which it does. What a chair does there hangs on very little
-of its state, so that windows must be short.
+In: a run's trial. Out: the stretches in which it does, and how far and how fast casters are turned
+at a time. What a chair does there hangs on very little of its state, so that windows must be short,
+and a caster's rate is a part of the state.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +18,36 @@ Array = NDArray[np.float64]
 SWING = 0.1  # rad, the least swing from side to side; a sensor scatters less
 FASTEST = 0.35  # s, the longest swing: no person steers so fast (assumption)
 SWINGS = 5  # that follow each other, at least
+NEAR = 5  # samples, through which a cubic tells angle and rate
 
 CASTERS = ("left_caster_angle", "right_caster_angle")
 
 
-def stretches(trial: Trial) -> list[tuple[float, float]]:
-    """From when to when (s) a caster shimmies; each caster by itself."""
-    out: list[tuple[float, float]] = []
+@dataclass(frozen=True)
+class Stretch:
+    """A stretch in which a caster shimmies: from when to when, and its median swing, all in s."""
+
+    begin: float
+    end: float
+    swing: float
+
+
+def stretches(trial: Trial) -> list[Stretch]:
+    """Where a caster shimmies, in order; those of two casters that overlap are one."""
+    out: list[Stretch] = []
     for channel in CASTERS:
         if channel in trial.channels:
             time, angle = trial.samples(channel)
             out += _fast(time[_turns(np.unwrap(angle))])
-    return out
+    return _joined(sorted(out, key=lambda s: s.begin))
+
+
+def turned(trial: Trial, channel: str, when: float) -> tuple[float, float]:
+    """Angle (rad) and rate (rad/s) of a measured caster at a time (s)."""
+    time, angle = trial.samples(channel)
+    near = np.sort(np.argsort(np.abs(time - when))[:NEAR])
+    rate, value = np.polyfit(time[near] - when, np.unwrap(angle[near]), 3)[2:]
+    return float(value), float(rate)
 
 
 def _turns(angle: Array) -> NDArray[np.int64]:
@@ -43,10 +64,24 @@ def _turns(angle: Array) -> NDArray[np.int64]:
     return np.array(out, np.int64)
 
 
-def _fast(turns: Array) -> list[tuple[float, float]]:
+def _fast(turns: Array) -> list[Stretch]:
     """Stretches of at least SWINGS swings, each no longer than FASTEST; turns: s."""
-    out = []
-    for part in np.split(turns, np.flatnonzero(np.diff(turns) > FASTEST) + 1):
-        if part.size > SWINGS:
-            out.append((float(part[0]), float(part[-1])))
+    parts = np.split(turns, np.flatnonzero(np.diff(turns) > FASTEST) + 1)
+    return [
+        Stretch(float(part[0]), float(part[-1]), float(np.median(np.diff(part))))
+        for part in parts
+        if part.size > SWINGS
+    ]
+
+
+def _joined(some: list[Stretch]) -> list[Stretch]:
+    """Stretches in order, those that overlap made one, with the shorter swing."""
+    out: list[Stretch] = []
+    for s in some:
+        if out and s.begin <= out[-1].end:
+            last = out[-1]
+            end, swing = max(last.end, s.end), min(last.swing, s.swing)
+            out[-1] = replace(last, end=end, swing=swing)
+        else:
+            out.append(s)
     return out

@@ -1,10 +1,10 @@
 """Windows: stretches of a run whose initial state is free.
 
 In: runs. Out: windows of about two seconds, shorter in runs in which a caster shimmies. Over a
-whole run every small error adds up and everything becomes significant; over a second or two only
-forces show. A window is simulated from a
-little before it begins (the lead), so that what is fast in the chair has settled on the slow state
-when its first sample counts.
+whole run every
+small error adds up and everything becomes significant; over a second or two only forces show. A
+window is simulated from a little before it begins (the lead), so that what is fast in the chair has
+settled on the slow state when its first sample counts.
 """
 
 from __future__ import annotations
@@ -18,13 +18,17 @@ from numpy.typing import NDArray
 
 from mjchair.diagnosis.data import shimmy
 from mjchair.diagnosis.data.first_state import stops
+from mjchair.diagnosis.data.shimmy import Stretch
 from mjchair.diagnosis.data.standstill import rests
 from mjchair.diagnosis.data.study import Run
 
 Array = NDArray[np.float64]
 
 LENGTH = 2.0  # s, of a window
-SHORT = 0.7  # s, where a caster shimmies: over a longer one its swings hang on too little
+# where a caster shimmies: over many swings a chair that is a little other gets out of step, and a
+# fit finds no way to the size of an effect
+SWINGS = 6
+SHORT = (0.2, 0.7)  # s, within which such windows are
 LEAD = 0.2  # s
 FEWEST = 5  # samples of a window
 
@@ -55,8 +59,8 @@ def cut(runs: Sequence[Run], step: float, length: float = LENGTH) -> list[Window
     """
     windows: list[Window] = []
     for i, run in enumerate(runs):
-        time, mine, swings = run.trial.time, list[Window](), shimmy.stretches(run.trial)
-        for edges in _edges(run, step, SHORT if swings else length):
+        time, mine, shaken = run.trial.time, list[Window](), shimmy.stretches(run.trial)
+        for edges in _edges(run, step, _length(length, shaken)):
             for begin, end in pairwise(edges):
                 at_start = begin == time[0]
                 first = begin + (LEAD if at_start else 0.0)
@@ -64,7 +68,7 @@ def cut(runs: Sequence[Run], step: float, length: float = LENGTH) -> list[Window
                 if rows.size < FEWEST:
                     continue
                 start = begin - (0.0 if at_start else LEAD)
-                there = any(a < end and first < b for a, b in swings)
+                there = any(s.begin < end and first < s.end for s in shaken)
                 mine.append(
                     Window(i, len(mine), float(start), float(first), float(end), rows, there)
                 )
@@ -76,6 +80,15 @@ def calm(windows: Sequence[Window], which: Collection[int]) -> list[int]:
     """Of some windows, those in which no caster shimmies; all of them where every one does."""
     quiet = [int(i) for i in which if not windows[i].shimmies]
     return quiet or [int(i) for i in which]
+
+
+def _length(usual: float, shaken: Sequence[Stretch]) -> float:
+    """Length (s) of the windows of a run in which casters shimmy there, if anywhere.
+
+    The shimmy grows out of swings too small to be seen, so all windows of the run are short.
+    """
+    swing = min((s.swing for s in shaken), default=np.inf)
+    return min(usual, float(np.clip(SWINGS * swing, *SHORT))) if shaken else usual
 
 
 def _edges(run: Run, step: float, length: float) -> list[Array]:

@@ -23,12 +23,12 @@ from mjchair.diagnosis.fit.process import Process
 from mjchair.diagnosis.fit.variant import Variant
 from mjchair.diagnosis.fit.whitening import Whitener
 from mjchair.diagnosis.next_experiment.manoeuvres import Manoeuvre, Setting
-from mjchair.diagnosis.replay.chair_state import SLOW, STEPS, State
+from mjchair.diagnosis.replay.chair_state import SLOW, State
 from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.pulses import Pulse, pulse_answers, pulses
 from mjchair.diagnosis.replay.sensor_errors import SensorErrors
 from mjchair.diagnosis.replay.simulator import STATE, Job, Outcome, WindowSimulator
-from mjchair.diagnosis.replay.window_states import Track
+from mjchair.diagnosis.replay.window_states import Track, answers
 from mjchair.effects.effect import SensorError
 from mjchair.engine.install import installed
 from mjchair.measurement.trial import Trial
@@ -209,12 +209,11 @@ class Rehearsal:
             seen.applied(simulator, w, o.predicted)
             for w, o in zip(simulator.windows, outcomes, strict=True)
         ]
-        base, *aside = (
-            self._predict([chair], [simulator.chair.moved(s, step) for s in states])[0]
-            for step in (np.zeros(len(SLOW)), *np.diag(STEPS))
-        )
-        slow = [np.stack([a[i] - y for a in aside], axis=2) for i, y in enumerate(base)]
-        return Track(states, predicted, slow, [o.trace for o in outcomes], base, seen)
+        begun, coarse = dict(enumerate(states)), simulator.coarsened(self.model(chair))
+        slow = list(answers(simulator, coarse, seen, begun, 1.0).values())
+        track = Track(states, predicted, slow, [o.trace for o in outcomes])
+        track.coarse, track.seen = self._predict([chair], states)[0], seen
+        return track
 
     @property
     def shown(self) -> Column:

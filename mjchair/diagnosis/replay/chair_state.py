@@ -21,12 +21,23 @@ Array = NDArray[np.float64]
 Rest = tuple[float, Array]  # height of the chair's joint (m) and its attitude (quaternion)
 
 # the slow state: what a window may start from. Everything else (sinking, pitching, tire
-# deflections, wheel spin) settles on it within the lead of a window.
-SLOW = ("x", "y", "heading", "speed", "yaw_rate", "left_caster", "right_caster")
-STEPS = np.array([0.05, 0.05, 0.01, 0.02, 0.02, 0.03, 0.03])  # of finite differences
+# deflections, wheel spin) settles on it within the lead of a window. A caster's rate, and how far
+# its tire gives way to the side, do so too unless it shimmies.
+SLOW = (
+    *("x", "y", "heading", "speed", "yaw_rate", "left_caster", "right_caster"),
+    *("left_caster_rate", "right_caster_rate", "left_deflection", "right_deflection"),
+)
+ANGLES, SHIMMY = slice(5, 7), slice(7, 11)  # the casters' angles; what is free where they shimmy
+# of finite differences
+STEPS = np.array([0.05, 0.05, 0.01, 0.02, 0.02, 0.03, 0.03, 0.5, 0.5, 0.002, 0.002])
 # prior where data see it; a caster turns back within the lead of a window, so that a wide prior
 # would let a poor model throw it anywhere
 BROAD = np.array([1.0, 1.0, 0.3, 0.3, 0.3, 0.05, 0.05])
+# rad, rad/s and m, of casters that shimmy. A search goes one prior a step, and with wider ones it
+# overshoots: with 0.3, 10 and 0.02 chi2 of the shimmying windows of the right chair became 708, and
+# 360 with these (from the true states 264)
+SWINGING = np.array([0.1, 0.1, 3.0, 3.0, 0.01, 0.01])
+LATERAL = 1  # place of the lateral deflection in a tire's state (engine/wheel.py)
 # a standing chair rocks on its tires when it is given a speed: there speed is not a slow state
 STANDING = 0.002  # m/s and rad/s
 LINKED = np.array([1.0, 1.0, 0.01, 0.05, 0.05, 0.05, 0.05])  # and where only the last window does
@@ -69,6 +80,10 @@ class Chair:
         self.casters = [self._wheel(model, joint(w), w) for w in ("left_caster", "right_caster")]
         swivels = [joint(f"{w}_swivel") for w in ("left_caster", "right_caster")]
         self.swivel_q = [int(model.jnt_qposadr[j]) for j in swivels]
+        self.swivel_dof = [int(model.jnt_dofadr[j]) for j in swivels]
+        self.deflections = [
+            _tire_state(model, joint(w)) + LATERAL for w in ("left_caster", "right_caster")
+        ]
 
     @staticmethod
     def _wheel(model: mujoco.MjModel, joint: int, name: str) -> Wheel:
@@ -105,11 +120,11 @@ class Chair:
         """The state moved along the slow state.
 
         Args:
-          change: (7,), in the order of SLOW: m, m, rad, m/s, rad/s, rad, rad.
+          change: (11,), in the order of SLOW: m, m, rad, m/s, rad/s, rad, rad, rad/s, rad/s, m, m.
         """
         out = state.copy()
         q, v = self.qpos, self.dof
-        dx, dy, turn, speed, yaw, left, right = change
+        dx, dy, turn, speed, yaw = change[:5]
         rotation = np.zeros(9)
         mujoco.mju_quat2Mat(rotation, out.qpos[q + 3 : q + 7])
         axes = rotation.reshape(3, 3)
@@ -128,8 +143,25 @@ class Chair:
             out.qvel[v : v + 3] = spun
         for dof, radius, lateral in self.rear:
             out.qvel[dof] += (speed - yaw * lateral) / radius
-        swung = zip(self.casters, self.swivel_q, (left, right), strict=True)
+        swung = zip(self.casters, self.swivel_q, change[ANGLES], strict=True)
         for (dof, radius, lateral), address, angle in swung:
             out.qvel[dof] += (speed - yaw * lateral) * np.cos(out.qpos[address]) / radius
             out.qpos[address] += angle
+        rates, deflections = np.split(change[SHIMMY], 2)
+        out.qvel[self.swivel_dof] += rates
+        out.act[self.deflections] += deflections
         return out
+
+    def swung(self, state: State, side: int, angle: float, rate: float) -> State:
+        """The state with a caster (0: left) turned to an angle (rad), at a rate (rad/s)."""
+        out, at = state.copy(), self.swivel_q[side]
+        out.qpos[at] += np.angle(np.exp(1j * (angle - out.qpos[at])))
+        out.qvel[self.swivel_dof[side]] = rate
+        return out
+
+
+def _tire_state(model: mujoco.MjModel, joint: int) -> int:
+    """Where in `act` the state of the tire begins whose wheel turns about a joint."""
+    mine = model.actuator_trnid[:, 0] == joint
+    mine &= model.actuator_dyntype == mujoco.mjtDyn.mjDYN_USER
+    return int(model.actuator_actadr[np.flatnonzero(mine)[0]])

@@ -7,7 +7,7 @@ simulation itself.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import mujoco
@@ -15,8 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.diagnosis.data import first_state
+from mjchair.diagnosis.data.shimmy import CASTERS, turned
 from mjchair.diagnosis.data.windows import Window
-from mjchair.diagnosis.replay.chair_state import BROAD, LINKED, SLOW, STANDING, STEPS, State
+from mjchair.diagnosis.replay.chair_state import (
+    ANGLES,
+    BROAD,
+    LINKED,
+    SLOW,
+    STANDING,
+    STEPS,
+    SWINGING,
+    State,
+)
 from mjchair.diagnosis.replay.noise import Noise
 from mjchair.diagnosis.replay.sampling import residual
 from mjchair.diagnosis.replay.sensor_errors import SensorErrors
@@ -29,6 +39,7 @@ from mjchair.simulation.initial import position_joints, start
 Array = NDArray[np.float64]
 ROUNDS = 2  # Gauss-Newton rounds a window
 MORE = 4  # further ones, as where casters flip
+SHIMMYING = 10  # rounds where casters shimmy: a search begins far from where it ends
 MUCH = 0.1  # of the misfit: a step that promised as much, and failed, came of wrong answers
 ENOUGH = 0.5  # of what a step promised: where it brings more, the answers are not made anew
 FINER = 0.1  # of the steps of finite differences, where a step of the fit failed
@@ -45,7 +56,7 @@ class Track:
 
     Attributes:
       states: at the start of each window, as of the base model. predicted: (rows, channels) each.
-      slow: d predicted / d slow state, (rows, channels, 7) each, times chair.STEPS.
+      slow: d predicted / d slow state, (rows, channels, 11) each, times chair.STEPS.
       trace: qpos, qvel and act along each window, after each step. coarse: predictions at the
         coarse step, once they were needed; seen: by what sensors.
       touchy: windows whose motion answers to so small changes that derivatives need the fine step,
@@ -89,20 +100,27 @@ def first_states(simulator: WindowSimulator, model: mujoco.MjModel) -> dict[int,
 
 
 def prior(simulator: WindowSimulator, window: int, state: State) -> Array:
-    """Standard deviation of the slow state of a window that starts at `state`, (7,)."""
-    spread = _moving_prior(simulator, window)
+    """Standard deviation of the slow state of a window that starts at `state`, (11,)."""
+    spread = np.r_[_moving_prior(simulator, window), SWINGING[2:]]
+    if simulator.windows[window].shimmies:
+        spread[ANGLES.start :] = SWINGING
     if _stands(simulator, window, state):
         spread[3:5] = STANDING
     # nothing tells where an unseen position is; what its column answers is rounding, and a large
     # residual would be laid on it
     spread[~_tells(simulator, window)] = 1e-6
-    return spread
+    return np.asarray(spread)
 
 
 def _tells(simulator: WindowSimulator, window: int) -> NDArray[np.bool_]:
-    """Which of the slow state a window may tell: all but positions that no channel sees, (7,)."""
-    seen = first_state.observed(simulator.study.runs[simulator.windows[window].run])
-    return seen | (np.arange(len(SLOW)) >= 2)
+    """Which of the slow state a window may tell, (11,).
+
+    All but positions that no channel sees, and how casters swing that are not seen to shimmy.
+    """
+    w = simulator.windows[window]
+    seen = first_state.observed(simulator.study.runs[w.run])
+    shown = seen | (np.arange(seen.size) >= 2)
+    return np.asarray(np.r_[shown, np.tile(seen[ANGLES] & w.shimmies, 2)])
 
 
 def _stands(simulator: WindowSimulator, window: int, state: State) -> bool:
@@ -115,7 +133,7 @@ def _moving_prior(simulator: WindowSimulator, window: int) -> Array:
     seen = first_state.observed(simulator.study.runs[w.run])
     if w.index == 0:
         loose = np.where(seen, BROAD, np.array([1.0, 1.0, 0.05, 1.0, 0.3, 0.3, 0.3]))
-        loose[5:] = np.where(seen[5:], BROAD[5:], 0.3)  # nothing has turned the casters yet
+        loose[ANGLES] = np.where(seen[ANGLES], BROAD[ANGLES], 0.3)  # nothing has turned them yet
         given = simulator.study.runs[w.run].given
         if "speed" in given and not seen[3]:
             loose[3] = 0.1
@@ -159,17 +177,22 @@ def track(
     with installed():
         for index in sorted(by_index):
             members = by_index[index]
-            search = {i: Search(states[i], states[i], touchy=i in touchy) for i in members}
+            begun = {i: states[i] for i in members}
+            if not kept:
+                shimmying = {i: s for i, s in begun.items() if simulator.windows[i].shimmies}
+                begun |= _as_measured(simulator, model, errors, shimmying, white)
+            search = {i: Search(s, s, touchy=i in touchy) for i, s in begun.items()}
             going = search
             most = _most(simulator, before, members, white) if before and kept else np.inf
             # answers that are kept from another chair would lead further rounds astray
-            for round_ in range(ROUNDS + MORE):
+            for round_ in range(SHIMMYING):
                 if round_ and sum(s.size for s in search.values()) > most:
                     break
                 going = {
                     i: s
                     for i, s in going.items()
-                    if _goes_on(s, round_, kept, _stands(simulator, i, s.state))
+                    if (round_ < ROUNDS + MORE or simulator.windows[i].shimmies)
+                    and _goes_on(s, round_, kept, _stands(simulator, i, s.state))
                 }
                 if not going:
                     break
@@ -186,6 +209,42 @@ def track(
                 if before is None:
                     _hand_over(simulator, model, i, s.trace, states)
     return Track(states, predicted, slow, traces, touchy=frozenset(touchy))
+
+
+def _as_measured(
+    simulator: WindowSimulator,
+    model: mujoco.MjModel,
+    errors: SensorErrors,
+    states: Mapping[int, State],
+    white: Array,
+) -> dict[int, State]:
+    """States from which casters that shimmy are turned as measured, where this fits better.
+
+    The state of a chair whose casters do not shimmy, or in another rhythm, leads a fit astray.
+
+    Args:
+      states: by window. white: (windows, channels) standard deviations.
+    """
+    measured = {i: _measured_swing(simulator, i, state) for i, state in states.items()}
+    best: dict[int, State] = {}
+    least: dict[int, float] = {}
+    for some in (states, measured):
+        for i, outcome in _traced(simulator, model, some).items():
+            w = simulator.windows[i]
+            size = _size(simulator, w, errors.applied(simulator, w, outcome.predicted), white[i])
+            if size < least.get(i, np.inf):
+                best[i], least[i] = some[i], size
+    return dict(states) | best
+
+
+def _measured_swing(simulator: WindowSimulator, window: int, state: State) -> State:
+    """A state with the casters that are measured turned as they are where the window starts."""
+    w = simulator.windows[window]
+    trial = simulator.study.runs[w.run].trial
+    for side, channel in enumerate(CASTERS):
+        if channel in trial.channels:
+            state = simulator.chair.swung(state, side, *turned(trial, channel, w.start))
+    return state
 
 
 def _most(
@@ -255,7 +314,7 @@ def _leads_astray(search: Search, stands: bool) -> bool:
 
 
 def _traced(
-    simulator: WindowSimulator, model: mujoco.MjModel, states: dict[int, State]
+    simulator: WindowSimulator, model: mujoco.MjModel, states: Mapping[int, State]
 ) -> dict[int, Outcome]:
     jobs = [Job(model, simulator.windows[i], state) for i, state in states.items()]
     done = simulator.run(jobs, trace=STATE) if jobs else []
@@ -301,8 +360,8 @@ def _fit_round(
             s.state = simulator.chair.moved(s.best, s.change)
     for model, share, touchy in ((coarse, 1.0, False), (fine, FINER, True)):
         some = {i: state for i, state in asked.items() if search[i].touchy == touchy}
-        for i, answers in _answers(simulator, model, errors, some, share).items():
-            slow[i] = answers
+        for i, columns in answers(simulator, model, errors, some, share).items():
+            slow[i] = columns
     for i in good:
         s = search[i]
         change, s.promise = _step(simulator, i, s, slow[i], white[i])
@@ -313,14 +372,14 @@ def _fit_round(
         s.state = simulator.chair.moved(s.state, s.change)
 
 
-def _answers(
+def answers(
     simulator: WindowSimulator,
     model: mujoco.MjModel,
     errors: SensorErrors,
     states: dict[int, State],
     share: float,
 ) -> dict[int, Array]:
-    """How windows answer to their slow states: (rows, channels, 7) each, times chair.STEPS.
+    """How windows answer to their slow states: (rows, channels, 11) each, times chair.STEPS.
 
     What a window cannot tell is not simulated, and answers with zero.
 
@@ -349,7 +408,7 @@ def _answers(
 def _step(
     simulator: WindowSimulator, i: int, search: Search, slow: Array, white: Array
 ) -> tuple[Array, float]:
-    """Linear step of a window's slow state, in units of chair.STEPS, (7,), and what it promises.
+    """Linear step of a window's slow state, in units of chair.STEPS, (11,), and what it promises.
 
     A chair that misses the samples by more than their noise is not right, and what it leaves tells
     little of states that no channel sees: they would stand in for what is missing.
