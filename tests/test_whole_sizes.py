@@ -85,7 +85,7 @@ def test_a_fit_from_a_size_ends_where_it_falls_too_far_behind(monkeypatch, besid
         return "the fit"
 
     monkeypatch.setattr(whole_sizes, "refit", refit)
-    monkeypatch.setattr(whole_sizes, "chi2", lambda *_: 0.0)
+    monkeypatch.setattr(whole_sizes, "chi2", lambda *_: 2000.0)
     monkeypatch.setattr(whole_sizes, "best_sizes", lambda *_: [seen])
     monkeypatch.setattr(whole_beside, "_with_best", lambda *_: seen)
     scrub = SimpleNamespace(effect=find("turning_scrub"))
@@ -125,7 +125,7 @@ def test_a_chair_that_does_not_shimmy_as_measured_is_no_measure_of_one_that_may(
     )
     shown = np.column_stack([phase, swing * np.sin(phase + 1.0)])
     reaches = []
-    monkeypatch.setattr(whole_sizes, "chi2", lambda *_: 0.0)
+    monkeypatch.setattr(whole_sizes, "chi2", lambda *_: 2000.0)
     monkeypatch.setattr(whole_sizes, "best_sizes", lambda *_: [Seen(500.0, Variant(()))])
     monkeypatch.setattr(whole_sizes, "starts", lambda _: ["a start"])
     monkeypatch.setattr(whole_sizes, "fit_from", lambda *args: reaches.append(args[-1]) or "a fit")
@@ -252,3 +252,18 @@ def test_fits_without_whole_sizes_are_not_made_again(monkeypatch):
     one = replace(ended(0.1, 10.0), variant=Variant((), terms=(term,)))
     found = whole_sizes.compared(SimpleNamespace(plain=SimpleNamespace(total=90.0)), one)
     assert found == one
+
+
+@pytest.mark.parametrize(
+    ("second", "begun"), [(1400.0, ["slides", "scrubs"]), (1600.0, ["slides"])]
+)
+def test_what_misses_half_of_what_another_size_brings_begins_no_fit(monkeypatch, second, begun):
+    """Of casters that shimmy a tire that slides tells a little, and its fit is a long one."""
+    sizes = {"slides": Seen(1000.0, "slides"), "scrubs": Seen(second, "scrubs")}
+    monkeypatch.setattr(whole_sizes, "chi2", lambda *_: 2000.0)
+    monkeypatch.setattr(whole_sizes, "starts", lambda _: list(sizes))
+    monkeypatch.setattr(whole_sizes, "best_sizes", lambda start, *_: [sizes[start]])
+    monkeypatch.setattr(whole_sizes, "fit_from", lambda _base, begin, *_: f"fit of {begin}")
+    plain = SimpleNamespace(variant=None, track=None, chi2=np.ones(1))
+    base = SimpleNamespace(bench=SimpleNamespace(windows=np.arange(1)), plain=plain)
+    assert list(whole_sizes.fits(base)) == [(s, f"fit of {s}") for s in begun]

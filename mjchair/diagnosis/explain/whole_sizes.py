@@ -92,11 +92,15 @@ def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitte
         seen: Seen = base.looked[key]
         return seen
 
-    for start in starts(base):
-        for begin in best_sizes(start, look, nothing, most):
-            made = fit_from(base, begin.variant, windows, reach)
-            if made is not None:
-                yield start, made
+    begun = [(s, at) for s in starts(base) for at in best_sizes(s, look, nothing, most)]
+    # what misses half of what another size brings in the same windows begins no fit either
+    brings = rules.REPLACES * max((nothing - at.chi2 for _, at in begun), default=0.0)
+    for start, at in begun:
+        if nothing - at.chi2 < brings:
+            continue
+        made = fit_from(base, at.variant, windows, reach)
+        if made is not None:
+            yield start, made
 
 
 def looked_at(
