@@ -57,7 +57,7 @@ def test_a_step_promises_what_it_explains(step):
     ("promise", "stands", "kept", "rounds"),
     [
         (window_states.PROMISE, False, False, 0),  # what it promises, the elimination does
-        (5.0, False, False, 9),
+        (5.0, False, False, window_states.ROUNDS + window_states.MORE),
         (5.0, True, False, window_states.ROUNDS),  # at rest a chair answers in steps
         (5.0, False, True, window_states.ROUNDS),  # answers of another chair lead astray
     ],
@@ -68,6 +68,14 @@ def test_how_long_a_window_goes_on(promise, stands, kept, rounds):
     assert going == [True] * rounds + [False] * (9 - rounds)
     search.calm = True
     assert not window_states._goes_on(search, 0, kept, stands)
+
+
+@pytest.mark.parametrize(("size", "rounds"), [(np.inf, 1), (100.0, 1), (40.0, 10)])
+def test_the_state_of_a_shimmy_is_sought_longer_but_not_for_a_little_of_its_misfit(size, rounds):
+    """A step promises 5; of a chair that is not right the rest is not for the state."""
+    search = window_states.Search(None, None, size, promise=5.0, shimmies=True)
+    going = [window_states._goes_on(search, k, False, False) for k in range(12)]
+    assert going == [True] * rounds + [False] * (12 - rounds)
 
 
 @pytest.mark.parametrize(

@@ -40,6 +40,7 @@ Array = NDArray[np.float64]
 ROUNDS = 2  # Gauss-Newton rounds a window
 MORE = 4  # further ones, as where casters flip
 SHIMMYING = 10  # rounds where casters shimmy: a search begins far from where it ends
+LITTLE = 0.1  # of the misfit there, which a step must promise: more rounds bring no other answer
 MUCH = 0.1  # of the misfit: a step that promised as much, and failed, came of wrong answers
 ENOUGH = 0.5  # of what a step promised: where it brings more, the answers are not made anew
 FINER = 0.1  # of the steps of finite differences, where a step of the fit failed
@@ -181,7 +182,10 @@ def track(
             if not kept:
                 shimmying = {i: s for i, s in begun.items() if simulator.windows[i].shimmies}
                 begun |= _as_measured(simulator, model, errors, shimmying, white)
-            search = {i: Search(s, s, touchy=i in touchy) for i, s in begun.items()}
+            search = {
+                i: Search(s, s, touchy=i in touchy, shimmies=simulator.windows[i].shimmies)
+                for i, s in begun.items()
+            }
             going = search
             most = _most(simulator, before, members, white) if before and kept else np.inf
             # answers that are kept from another chair would lead further rounds astray
@@ -191,8 +195,7 @@ def track(
                 going = {
                     i: s
                     for i, s in going.items()
-                    if (round_ < ROUNDS + MORE or simulator.windows[i].shimmies)
-                    and _goes_on(s, round_, kept, _stands(simulator, i, s.state))
+                    if _goes_on(s, round_, kept, _stands(simulator, i, s.state))
                 }
                 if not going:
                     break
@@ -276,6 +279,7 @@ class Search:
         the best. change: from the best to the one that was tried. promise: by how much that
         lessens the misfit, if linear. calm: whether no step from the best is worth it.
       touchy: whether a step failed, so that answers are made at the fine step, of small changes.
+      shimmies: whether a caster does, in the window.
       fresh: whether the answers were made at the best.
     """
 
@@ -286,6 +290,7 @@ class Search:
     promise: float = np.inf
     calm: bool = False
     touchy: bool = False
+    shimmies: bool = False
     fresh: bool = False
     predicted: Array = field(default_factory=lambda: np.empty(0))
     trace: dict[str, Array] = field(default_factory=dict)
@@ -305,7 +310,10 @@ def _goes_on(search: Search, round_: int, kept: bool, stands: bool) -> bool:
         return False
     if stands or (kept and not search.touchy):
         return round_ < ROUNDS
-    return search.promise > PROMISE
+    if search.shimmies:
+        least = max(PROMISE, LITTLE * search.size) if round_ else PROMISE
+        return round_ < SHIMMYING and search.promise > least
+    return round_ < ROUNDS + MORE and search.promise > PROMISE
 
 
 def _leads_astray(search: Search, stands: bool) -> bool:
