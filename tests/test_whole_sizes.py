@@ -52,6 +52,15 @@ def test_a_fit_begins_next_to_the_size_that_is_there(truth):
     assert size == pytest.approx(truth, abs=0.008)
 
 
+@pytest.mark.parametrize("truth", [-0.05, -0.028])
+def test_a_fit_of_wheels_nearer_to_their_stems_begins_next_to_how_near_they_are(truth):
+    """No small change of a trail leads to casters that shimmy; 0 of it is left at -0.05 m."""
+    size = begun(
+        find("caster_trail"), lambda v: 2000.0 - 1500.0 * math.exp(-(((v - truth) / 0.01) ** 2))
+    )
+    assert size == pytest.approx(truth, abs=0.005)
+
+
 def test_a_fit_begins_in_each_of_two_valleys():
     """Casters shimmied as well at 0.13 m as at 0.08, where 0.09 was hidden, and not at 0.1."""
 

@@ -16,7 +16,8 @@ def edit(spec: mujoco.MjSpec, length: float) -> None:
 
 EFFECT = Effect(
     name="caster_trail",
-    parameters=(Parameter("length", "m", 0.015, -0.04, 0.1),),
+    # at -0.05 the wheels of usual casters stand under their stems, and shimmy
+    parameters=(Parameter("length", "m", 0.015, -0.06, 0.1, whole=(-0.05, -0.035, -0.02)),),
     signature="swivel dynamics",
     source="casters have 0.04-0.06 m of trail",
     edit=edit,
