@@ -37,7 +37,7 @@ def _first(run: Run, channel: str) -> tuple[float, float] | None:
 
 
 def observed(run: Run) -> NDArray[np.bool_]:
-    """Which of the slow states (chair.SLOW) the run's channels see directly, (7,)."""
+    """Which of the first seven slow states (chair_state.SLOW) a run's channels see, (7,)."""
     have = set(run.trial.channels)
     place = {"position.x", "position.y"} <= have
     wheels = {f"{side}_wheel_{kind}" for side in SIDES for kind in KINDS}
