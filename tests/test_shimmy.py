@@ -92,8 +92,8 @@ def test_states_of_the_right_chair_are_found_from_those_of_one_that_does_not_shi
 
 
 def test_how_casters_swing_is_free_only_where_they_shimmy(shaking):
-    for i, w in enumerate(shaking.windows):
-        state = track(shaking, shaking.base, noise.estimate(shaking.study), only=[i]).states[i]
+    states = track(shaking, shaking.base, noise.estimate(shaking.study)).states
+    for i, (w, state) in enumerate(zip(shaking.windows, states, strict=True)):
         spread = prior(shaking, i, state)
         assert spread.shape == (len(SLOW),)
         assert (spread[SHIMMY] > 1e-3).all() == w.shimmies

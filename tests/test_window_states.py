@@ -104,7 +104,7 @@ def test_a_step_that_promised_much_and_failed_is_made_anew_with_small_changes(mo
     """Answers to large changes, at a coarse step, lead astray where a wheel slides or shimmies."""
     asked = []
 
-    def answers(simulator, model, errors, states, share):
+    def answers(simulator, model, errors, states, share, shown):
         asked.extend((model, i, share) for i in states)
         return {i: "new" for i in states}
 
@@ -141,7 +141,7 @@ def test_answers_are_made_anew_where_a_step_brings_less_than_they_promise(
 ):
     asked = []
 
-    def answers(simulator, model, errors, states, share):
+    def answers(simulator, model, errors, states, share, shown):
         asked.extend(states)
         return dict.fromkeys(states, "new")
 

@@ -1,10 +1,9 @@
 """Windows: stretches of a run whose initial state is free.
 
 In: runs. Out: windows of about two seconds, shorter in runs in which a caster shimmies. Over a
-whole run every
-small error adds up and everything becomes significant; over a second or two only forces show. A
-window is simulated from a little before it begins (the lead), so that what is fast in the chair has
-settled on the slow state when its first sample counts.
+whole run every small error adds up and everything becomes significant; over a second or two only
+forces show. A window is simulated from a little before it begins (the lead), so that what is fast
+in the chair has settled on the slow state when its first sample counts.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from numpy.typing import NDArray
 
 from mjchair.diagnosis.data import shimmy
 from mjchair.diagnosis.data.first_state import stops
-from mjchair.diagnosis.data.shimmy import Stretch
 from mjchair.diagnosis.data.standstill import rests
 from mjchair.diagnosis.data.study import Run
 
@@ -82,13 +80,18 @@ def calm(windows: Sequence[Window], which: Collection[int]) -> list[int]:
     return quiet or [int(i) for i in which]
 
 
-def _length(usual: float, shaken: Sequence[Stretch]) -> float:
-    """Length (s) of the windows of a run in which casters shimmy there, if anywhere.
+def _length(usual: float, shaken: Sequence[shimmy.Stretch]) -> float:
+    """Length (s) of the windows of a run.
 
-    The shimmy grows out of swings too small to be seen, so all windows of the run are short.
+    A shimmy grows out of swings too small to be seen, so all windows of a run with one are short.
+
+    Args:
+      usual: s. shaken: where casters shimmy; nothing: nowhere.
     """
-    swing = min((s.swing for s in shaken), default=np.inf)
-    return min(usual, float(np.clip(SWINGS * swing, *SHORT))) if shaken else usual
+    if not shaken:
+        return usual
+    swing = min(s.swing for s in shaken)
+    return min(usual, float(np.clip(SWINGS * swing, *SHORT)))
 
 
 def _edges(run: Run, step: float, length: float) -> list[Array]:

@@ -209,11 +209,17 @@ class Rehearsal:
             seen.applied(simulator, w, o.predicted)
             for w, o in zip(simulator.windows, outcomes, strict=True)
         ]
-        begun, coarse = dict(enumerate(states)), simulator.coarsened(self.model(chair))
-        slow = list(answers(simulator, coarse, seen, begun, 1.0).values())
-        track = Track(states, predicted, slow, [o.trace for o in outcomes])
-        track.coarse, track.seen = self._predict([chair], states)[0], seen
-        return track
+        coarse = self._predict([chair], states)[0]
+        slow = answers(
+            simulator,
+            simulator.coarsened(self.model(chair)),
+            seen,
+            dict(enumerate(states)),
+            1.0,
+            dict(enumerate(coarse)),
+        )
+        traces = [o.trace for o in outcomes]
+        return Track(states, predicted, list(slow.values()), traces, coarse=coarse, seen=seen)
 
     @property
     def shown(self) -> Column:

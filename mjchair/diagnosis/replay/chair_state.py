@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.model.rolling import rolling_wheel
+from mjchair.model.wheels import wheels
 from mjchair.simulation import names
 from mjchair.simulation.initial import Initial, start
 
@@ -81,9 +82,8 @@ class Chair:
         swivels = [joint(f"{w}_swivel") for w in ("left_caster", "right_caster")]
         self.swivel_q = [int(model.jnt_qposadr[j]) for j in swivels]
         self.swivel_dof = [int(model.jnt_dofadr[j]) for j in swivels]
-        self.deflections = [
-            _tire_state(model, joint(w)) + LATERAL for w in ("left_caster", "right_caster")
-        ]
+        tires = {wheel.joint: int(model.actuator_actadr[wheel.actuator]) for wheel in wheels(model)}
+        self.deflections = [tires[joint(w)] + LATERAL for w in ("left_caster", "right_caster")]
 
     @staticmethod
     def _wheel(model: mujoco.MjModel, joint: int, name: str) -> Wheel:
@@ -158,10 +158,3 @@ class Chair:
         out.qpos[at] += np.angle(np.exp(1j * (angle - out.qpos[at])))
         out.qvel[self.swivel_dof[side]] = rate
         return out
-
-
-def _tire_state(model: mujoco.MjModel, joint: int) -> int:
-    """Where in `act` the state of the tire begins whose wheel turns about a joint."""
-    mine = model.actuator_trnid[:, 0] == joint
-    mine &= model.actuator_dyntype == mujoco.mjtDyn.mjDYN_USER
-    return int(model.actuator_actadr[np.flatnonzero(mine)[0]])

@@ -201,10 +201,8 @@ def track(
                     break
                 _fit_round(simulator, (model, coarse), errors, going, white, slow, kept)
             moved = {i: s.state for i, s in search.items() if not s.calm}
-            for i, outcome in _traced(simulator, model, moved).items():
-                w = simulator.windows[i]
-                shown = errors.applied(simulator, w, outcome.predicted)
-                search[i].judge(_size(simulator, w, shown, white[i]), shown, outcome.trace)
+            for i, tried in _tried(simulator, model, errors, moved, white).items():
+                search[i].judge(*tried)
             for i, s in search.items():
                 states[i], predicted[i], traces[i] = s.best, s.predicted, s.trace
                 if s.touchy:
@@ -229,15 +227,8 @@ def _as_measured(
       states: by window. white: (windows, channels) standard deviations.
     """
     measured = {i: _measured_swing(simulator, i, state) for i, state in states.items()}
-    best: dict[int, State] = {}
-    least: dict[int, float] = {}
-    for some in (states, measured):
-        for i, outcome in _traced(simulator, model, some).items():
-            w = simulator.windows[i]
-            size = _size(simulator, w, errors.applied(simulator, w, outcome.predicted), white[i])
-            if size < least.get(i, np.inf):
-                best[i], least[i] = some[i], size
-    return dict(states) | best
+    before, after = (_tried(simulator, model, errors, s, white) for s in (states, measured))
+    return {i: measured[i] if after[i][0] < before[i][0] else states[i] for i in states}
 
 
 def _measured_swing(simulator: WindowSimulator, window: int, state: State) -> State:
@@ -329,6 +320,22 @@ def _traced(
     return dict(zip(states, done, strict=True))
 
 
+def _tried(
+    simulator: WindowSimulator,
+    model: mujoco.MjModel,
+    errors: SensorErrors,
+    states: Mapping[int, State],
+    white: Array,
+) -> dict[int, tuple[float, Array, dict[str, Array]]]:
+    """What windows show from their states: misfit, predictions and trace, as `judge` takes them."""
+    out = {}
+    for i, outcome in _traced(simulator, model, states).items():
+        w = simulator.windows[i]
+        shown = errors.applied(simulator, w, outcome.predicted)
+        out[i] = _size(simulator, w, shown, white[i]), shown, outcome.trace
+    return out
+
+
 def _size(simulator: WindowSimulator, window: Window, seen: Array, white: Array) -> float:
     """Misfit of a window, where its free columns fit it best."""
     miss = residual(simulator.measured(window), seen, simulator.channels)
@@ -350,11 +357,11 @@ def _fit_round(
     fine, coarse = models
     good: list[int] = []
     asked: dict[int, State] = {}
-    for i, outcome in _traced(simulator, fine, {i: s.state for i, s in search.items()}).items():
-        s, w = search[i], simulator.windows[i]
-        shown = errors.applied(simulator, w, outcome.predicted)
+    states = {i: s.state for i, s in search.items()}
+    for i, tried in _tried(simulator, fine, errors, states, white).items():
+        s = search[i]
         before, promised = s.size, s.promise
-        if s.judge(_size(simulator, w, shown, white[i]), shown, outcome.trace):
+        if s.judge(*tried):
             good.append(i)
             s.fresh = not kept or (s.touchy and not before - s.size > ENOUGH * promised)
             if s.fresh:
@@ -368,7 +375,8 @@ def _fit_round(
             s.state = simulator.chair.moved(s.best, s.change)
     for model, share, touchy in ((coarse, 1.0, False), (fine, FINER, True)):
         some = {i: state for i, state in asked.items() if search[i].touchy == touchy}
-        for i, columns in answers(simulator, model, errors, some, share).items():
+        shown = {i: search[i].predicted for i in some} if touchy else None
+        for i, columns in answers(simulator, model, errors, some, share, shown).items():
             slow[i] = columns
     for i in good:
         s = search[i]
@@ -384,32 +392,35 @@ def answers(
     simulator: WindowSimulator,
     model: mujoco.MjModel,
     errors: SensorErrors,
-    states: dict[int, State],
+    states: Mapping[int, State],
     share: float,
+    shown: Mapping[int, Array] | None = None,
 ) -> dict[int, Array]:
     """How windows answer to their slow states: (rows, channels, 11) each, times chair.STEPS.
 
     What a window cannot tell is not simulated, and answers with zero.
 
     Args:
-      share: of STEPS, by which the states are moved.
+      share: of STEPS, by which the states are moved. shown: what the channels show of this model
+        from the states themselves, (rows, channels) each; None: it is simulated.
     """
+    told = {i: np.flatnonzero(_tells(simulator, i)) for i in states}
     jobs = []
     for i, state in states.items():
-        steps = share * np.diag(STEPS)[_tells(simulator, i)]
-        moved = [simulator.chair.moved(state, step) for step in steps]
-        jobs += [Job(model, simulator.windows[i], s) for s in (state, *moved)]
+        moved = [simulator.chair.moved(state, step) for step in share * np.diag(STEPS)[told[i]]]
+        begun = moved if shown is not None else [state, *moved]
+        jobs += [Job(model, simulator.windows[i], s) for s in begun]
     outcomes = iter(simulator.run(jobs))
+
+    def seen(i: int) -> Array:
+        return errors.applied(simulator, simulator.windows[i], next(outcomes).predicted)
+
     out = {}
     for i in states:
-        w = simulator.windows[i]
-        told = np.flatnonzero(_tells(simulator, i))
-        base, *seen = (
-            errors.applied(simulator, w, next(outcomes).predicted) for _ in range(1 + told.size)
-        )
+        base = seen(i) if shown is None else shown[i]
         out[i] = np.zeros((*base.shape, len(SLOW)))
-        for k, y in zip(told, seen, strict=True):
-            out[i][..., k] = (y - base) / share
+        for k in told[i]:
+            out[i][..., k] = (seen(i) - base) / share
     return out
 
 
