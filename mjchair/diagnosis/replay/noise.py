@@ -1,9 +1,10 @@
 """How much each channel scatters: white noise, its correlated part, and rounding.
 
 In: a study. Out: the noise of every channel, with a word on where it comes from. White noise comes
-from third differences, which smooth motion does not reach. What is correlated (drift within a
-window, autoregressive noise) is seen where the chair stands still; without a still stretch it is
-estimated from the study itself, and said so.
+from third differences, which smooth motion does not reach; that of a caster that shimmies does, so
+samples from there are left out. What is correlated (drift within a window, autoregressive noise) is
+seen where the chair stands still; without a still stretch it is estimated from the study itself,
+and said so.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mjchair.diagnosis.data import shimmy
 from mjchair.diagnosis.data.standstill import still_stretches
 from mjchair.diagnosis.data.study import Study
 from mjchair.measurement.sensors import sensor
@@ -22,6 +24,7 @@ from mjchair.measurement.trial import Trial
 Array = NDArray[np.float64]
 
 STILL = 0.5  # s, the shortest still stretch that is used
+FEW = 50  # samples: fewer, where no caster shimmies, do not tell a channel's noise
 SETTLES = 0.3  # s, at its start, that are not
 EDGES = (3.0, 6.0, 10.0)  # Hz, upper edges of the bands in which a study shows its noise
 
@@ -83,7 +86,7 @@ def telling(study: Study, channel: str) -> tuple[int, ...]:
 
 
 def _channel(study: Study, channel: str) -> Noise:
-    pieces = [study.runs[i].trial.samples(channel) for i in telling(study, channel)]
+    pieces = _calm([study.runs[i].trial for i in telling(study, channel)], channel)
     values = [np.unwrap(v) if sensor(channel).wraps else v for _, v in pieces]
     steps = [float(np.median(np.diff(t))) for t, _ in pieces if t.size > 1]
     step = float(np.median(steps or [0.01]))
@@ -109,6 +112,18 @@ def _channel(study: Study, channel: str) -> Noise:
         if given < 0.7 * white:
             source = "the data, which scatter more than study.toml says"
     return Noise(max(white, least), slow, max(time, 1e-3), source)
+
+
+def _calm(trials: Sequence[Trial], channel: str) -> list[tuple[Array, Array]]:
+    """Times and samples of a channel, apart where a caster shimmies; all where little is left."""
+    whole = [trial.samples(channel) for trial in trials]
+    parts: list[tuple[Array, Array]] = []
+    for trial, (time, values) in zip(trials, whole, strict=True):
+        edges = [edge for s in shimmy.stretches(trial) for edge in (s.begin, s.end)]
+        at = np.searchsorted(time, edges)
+        calm = slice(None, None, 2)  # a stretch with a shimmy follows each one without
+        parts += zip(np.split(time, at)[calm], np.split(values, at)[calm], strict=True)
+    return parts if sum(v.size for _, v in parts) > FEW else whole
 
 
 def _white(values: Sequence[Array]) -> float:
