@@ -1,13 +1,14 @@
 """Where a measured caster shimmies: it swings back and forth many times a second.
 
-In: a run's trial. Out: the stretches in which it does, and how far and how fast casters are turned
-at a time. What a chair does there hangs on very little of its state, so that windows must be short,
-and a caster's rate is a part of the state.
+In: a run's trial. Out: the stretches in which it does, and how its casters turn at a time. What a
+chair does there hangs on very little of its state, so that windows must be short, and how casters
+swing is a part of the state.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,9 @@ Array = NDArray[np.float64]
 SWING = 0.1  # rad, the least swing from side to side; a sensor scatters less
 FASTEST = 0.35  # s, the longest swing: no person steers so fast (assumption)
 SWINGS = 5  # that follow each other, at least
-NEAR = 5  # samples, through which a cubic tells angle and rate
+ROUND = 0.75  # swings back and forth, to either side of a time, that tell how a caster turns there
+FEWEST = 9  # samples
+RHYTHMS = np.linspace(0.75, 1.3, 23)  # of the median one, of which the best is taken
 
 CASTERS = ("left_caster_angle", "right_caster_angle")
 
@@ -32,6 +35,14 @@ class Stretch:
     swing: float
 
 
+class Turned(NamedTuple):
+    """How a caster turns: angle (rad), rate (rad/s) and acceleration (rad/s^2)."""
+
+    angle: float
+    rate: float
+    acceleration: float
+
+
 def stretches(trial: Trial) -> list[Stretch]:
     """Where a caster shimmies, in order; those of two casters that overlap are one."""
     out: list[Stretch] = []
@@ -42,12 +53,28 @@ def stretches(trial: Trial) -> list[Stretch]:
     return _joined(sorted(out, key=lambda s: s.begin))
 
 
-def turned(trial: Trial, channel: str, when: float) -> tuple[float, float]:
-    """Angle (rad) and rate (rad/s) of a measured caster at a time (s)."""
+def turned(trial: Trial, channel: str, when: float, swing: float) -> Turned:
+    """How a measured caster turns at a time (s), by a swing that grows or fades.
+
+    Args:
+      swing: about how long one lasts from side to side, s.
+    """
     time, angle = trial.samples(channel)
-    near = np.sort(np.argsort(np.abs(time - when))[:NEAR])
-    rate, value = np.polyfit(time[near] - when, np.unwrap(angle[near]), 3)[2:]
-    return float(value), float(rate)
+    fits = [_harmonic(time - when, np.unwrap(angle), np.pi / swing * r) for r in RHYTHMS]
+    return min(fits, key=lambda fit: fit[0])[1]
+
+
+def _harmonic(time: Array, angle: Array, omega: float) -> tuple[float, Turned]:
+    """Mean square that a swing of omega (rad/s) leaves, and how a caster turns at time 0."""
+    count = round(2.0 * ROUND * 2.0 * np.pi / omega / float(np.median(np.diff(time))))
+    near = np.argsort(np.abs(time))[: max(count, FEWEST)]
+    t, a = time[near], angle[near]
+    cos, sin = np.cos(omega * t), np.sin(omega * t)
+    basis = np.column_stack([np.ones_like(t), t, cos, sin, t * cos, t * sin])
+    c = np.linalg.lstsq(basis, a)[0]
+    left = float(np.mean((basis @ c - a) ** 2))
+    there = c[0] + c[2], c[1] + omega * c[3] + c[4], omega * (2.0 * c[5] - omega * c[2])
+    return left, Turned(*(float(value) for value in there))
 
 
 def _turns(angle: Array) -> NDArray[np.int64]:

@@ -28,6 +28,9 @@ LENGTH = 2.0  # s, of a window
 SWINGS = 6
 SHORT = (0.2, 0.7)  # s, within which such windows are
 LEAD = 0.2  # s
+# s, where one does: how casters swing is a part of their state and settles on nothing, and with
+# 0.2 s chi2 over the size of an effect is as rough again
+BRIEF = 0.06
 FEWEST = 5  # samples of a window
 
 
@@ -61,12 +64,13 @@ def cut(runs: Sequence[Run], step: float, length: float = LENGTH) -> list[Window
         for edges in _edges(run, step, _length(length, shaken)):
             for begin, end in pairwise(edges):
                 at_start = begin == time[0]
-                first = begin + (LEAD if at_start else 0.0)
+                there = any(s.begin < end and begin < s.end for s in shaken)
+                lead = BRIEF if there else LEAD
+                first = begin + (lead if at_start else 0.0)
                 rows = np.flatnonzero((time >= first) & (time < end))
                 if rows.size < FEWEST:
                     continue
-                start = begin - (0.0 if at_start else LEAD)
-                there = any(s.begin < end and first < s.end for s in shaken)
+                start = begin - (0.0 if at_start else lead)
                 mine.append(
                     Window(i, len(mine), float(start), float(first), float(end), rows, there)
                 )

@@ -141,8 +141,10 @@ def screen_columns(
     if _farthest(plain) > NEAR:
         plain = refit(bench, plain.variant, plain.track)
     _check_told(plain)
-    # a nuisance far from its prior stands in for something else: then the chair as given is nearer
-    if not rules.is_far(_farthest(plain)):
+    # a nuisance far from its prior stands in for something else: then the chair as given is nearer,
+    # as it is where casters shimmy: for a relaxation length stood the stiffness of their tires
+    shimmies = any(w.shimmies for w in simulator.windows)
+    if not shimmies and not rules.is_far(_farthest(plain)):
         variant, here, nuisances = plain.variant, plain.track, plain.columns
     around = Around(bench=bench, track=here, variant=variant, pulses=asked, answers=answers)
     tried = candidates.collect(around, effects, lambda key: say(f"effect {key}"))

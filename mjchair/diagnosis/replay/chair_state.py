@@ -29,6 +29,7 @@ SLOW = (
     *("left_caster_rate", "right_caster_rate", "left_deflection", "right_deflection"),
 )
 ANGLES, SHIMMY = slice(5, 7), slice(7, 11)  # the casters' angles; what is free where they shimmy
+DEFLECTIONS = slice(9, 11)  # of the casters' tires
 # of finite differences
 STEPS = np.array([0.05, 0.05, 0.01, 0.02, 0.02, 0.03, 0.03, 0.5, 0.5, 0.002, 0.002])
 # prior where data see it; a caster turns back within the lead of a window, so that a wide prior
@@ -153,8 +154,9 @@ class Chair:
         return out
 
     def swung(self, state: State, side: int, angle: float, rate: float) -> State:
-        """The state with a caster (0: left) turned to an angle (rad), at a rate (rad/s)."""
+        """The state with a caster (0: left) at an angle (rad) and rate (rad/s), tire unbent."""
         out, at = state.copy(), self.swivel_q[side]
         out.qpos[at] += np.angle(np.exp(1j * (angle - out.qpos[at])))
         out.qvel[self.swivel_dof[side]] = rate
+        out.act[self.deflections[side]] = 0.0
         return out
