@@ -153,24 +153,21 @@ def compared(base: Base, fitted: Fitted) -> Fitted:
 
     Where a wheel slides or shimmies, chi2 has many valleys, and a fit ends in the one in which it
     began. Ends that fit as well as a rival may say how well a size is known: its standard error is
-    at least the distance to each, over the root of the chi2 by which that is worse, as far as the
-    form of effects lets it count.
+    at least the distance between them.
     """
     fits = [fitted, *_beside(base, fitted)]
     if len(fits) == 1:
         return fitted
     best = min(fits, key=lambda f: f.total)
-    brought = gain(base, best)
-    most = rules.not_ruled_out(gain=brought)
+    most = rules.not_ruled_out(gain=gain(base, best))
     near = [f for f in fits if f.total - best.total < most]
-    worse = [max(rules.counts(f.total - best.total, gain=brought), 1.0) for f in near]
     std, sigmas = dict(best.std), dict(best.sigmas)
     for k, term, p in _whole(best):
-        away = [abs(f.variant.terms[k].values[p.name] - term.values[p.name]) for f in near]
+        sizes = [f.variant.terms[k].values[p.name] for f in near]
         key = ParameterId(term.effect.key, p.name)
-        std[key] = max(std[key], *(a / math.sqrt(w) for a, w in zip(away, worse, strict=True)))
-        shown = abs(term.values[p.name] - p.neutral) / std[key]
-        sigmas[term.effect.key] = min(sigmas[term.effect.key], shown)
+        std[key] = max(std[key], max(sizes) - min(sizes))
+        away = abs(term.values[p.name] - p.neutral) / std[key]
+        sigmas[term.effect.key] = min(sigmas[term.effect.key], away)
     return replace(best, std=std, sigmas=sigmas)
 
 
