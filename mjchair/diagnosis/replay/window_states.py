@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjchair.diagnosis.data import first_state
-from mjchair.diagnosis.data.shimmy import CASTERS, Turned, stretches, turned
+from mjchair.diagnosis.data.shimmy import CASTERS
 from mjchair.diagnosis.data.windows import Window
+from mjchair.diagnosis.replay import measured_swing
 from mjchair.diagnosis.replay.chair_state import (
     ANGLES,
     BROAD,
-    DEFLECTIONS,
     LINKED,
     SLOW,
     STANDING,
@@ -48,8 +48,6 @@ FINER = 0.1  # of the steps of finite differences, where a step of the fit faile
 # of misfit, in variances of the sensors' noise, that the step of a round promises
 PROMISE = 4.0  # from which answers to the slow state are made anew where it led
 CALM = 0.1  # below which it is not taken: the elimination of the state does as much
-ASIDE = 0.003  # m, by which a caster's tire gives way to show what it does to its swivel
-FURTHEST = 0.02  # m, that it may give way as a search begins
 # times the misfit of the chair before: above it no state helps, as where casters turn over and over
 HOPELESS = 100.0
 
@@ -231,67 +229,9 @@ def _as_measured(
     """
     angles = np.array([c in CASTERS for c in simulator.channels])
     white = np.where(angles, white, np.inf)
-    measured = {i: _measured_swings(simulator, i) for i in states}
-    swung = {i: _swung(simulator, states[i], measured[i]) for i in states}
-    swung = _deflected(simulator, model, swung, measured)
+    swung = measured_swing.states(simulator, model, states)
     before, after = (_tried(simulator, model, errors, s, white) for s in (states, swung))
     return {i: swung[i] if after[i][0] < before[i][0] else states[i] for i in states}
-
-
-def _measured_swings(simulator: WindowSimulator, window: int) -> list[Turned | None]:
-    """How the casters turn where a window starts, left and right; None: not measured."""
-    w = simulator.windows[window]
-    trial = simulator.study.runs[w.run].trial
-    swing = min(s.swing for s in stretches(trial))
-    seen = [c if c in trial.channels else None for c in CASTERS]
-    return [None if c is None else turned(trial, c, w.start, swing) for c in seen]
-
-
-def _swung(simulator: WindowSimulator, state: State, measured: list[Turned | None]) -> State:
-    """A state with the casters that are measured turned as they are."""
-    for side, m in enumerate(measured):
-        if m is not None:
-            state = simulator.chair.swung(state, side, m.angle, m.rate)
-    return state
-
-
-def _deflected(
-    simulator: WindowSimulator,
-    model: mujoco.MjModel,
-    states: Mapping[int, State],
-    measured: Mapping[int, list[Turned | None]],
-) -> dict[int, State]:
-    """States whose caster tires give way as far as the measured accelerations ask for.
-
-    Args:
-      states, measured: by window; each caster is turned as it is measured.
-    """
-    aside = np.zeros(len(SLOW))
-    aside[DEFLECTIONS] = ASIDE
-    moved = {i: simulator.chair.moved(state, aside) for i, state in states.items()}
-    here, there = (_accelerations(simulator, model, s) for s in (states, moved))
-    out = {}
-    for i, state in states.items():
-        change = np.zeros(len(SLOW))
-        for side, m in enumerate(measured[i]):
-            slope = (there[i][side] - here[i][side]) / ASIDE
-            if m is not None and slope != 0.0:
-                change[DEFLECTIONS][side] = (m.acceleration - here[i][side]) / slope
-        out[i] = simulator.chair.moved(state, np.clip(change, -FURTHEST, FURTHEST))
-    return out
-
-
-def _accelerations(
-    simulator: WindowSimulator, model: mujoco.MjModel, states: Mapping[int, State]
-) -> dict[int, Array]:
-    """Of the swivels as windows start, left and right, rad/s^2."""
-    out = {}
-    dofs = simulator.chair.swivel_dof
-    for i, outcome in _traced(simulator, model, states).items():
-        inside = simulator.in_run(model, simulator.windows[i].run)
-        after = simulator.carrier.back(inside, outcome.trace, 0)
-        out[i] = (after.qvel[dofs] - states[i].qvel[dofs]) / model.opt.timestep
-    return out
 
 
 def _most(
