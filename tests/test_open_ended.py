@@ -11,6 +11,7 @@ from mjchair.diagnosis.explain import open_ended
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.result import Estimate
+from mjchair.effects import caster_friction
 from mjchair.effects.library import find
 from mjchair.errors import MjchairError
 
@@ -118,6 +119,33 @@ def test_what_no_chair_can_have_does_not_fit(monkeypatch, error):
 
     found, _ = looked(monkeypatch, refuse)
     assert found.at_least == {}
+
+
+def test_each_caster_that_is_stuck_has_a_least_size_of_its_own(monkeypatch):
+    """Two casters of 4 N m, which never turned, were named 0.79 +- 0.80 and 0.47 +- 0.09 N m."""
+    effect, shape = caster_friction.ONE_SIDED, {"slope": 2.0}
+    keys = {side: ParameterId(effect.key, side) for side in ("left", "right")}
+
+    def end(values, free):
+        term = Term(effect, {**values, **shape}, free)
+        total = 3000.0 if values["left"] > 0.3 else PLAIN
+        total += 1e4 * (values["right"] - 0.5) ** 2
+        known = {key: 0.03 for key in keys.values()}
+        return End(Variant((), terms=(term,)), total, total, std=known)
+
+    def refit(bench, begin, track, nuisances, rounds=None):
+        (term,) = begin.terms
+        assert "slope" not in term.free or rounds == 0
+        return end({side: term.values[side] for side in keys}, term.free)
+
+    monkeypatch.setattr(open_ended, "refit", refit)
+    monkeypatch.setattr(open_ended, "nuisances_of", lambda *_: {})
+    base = SimpleNamespace(bench=None, plain=SimpleNamespace(total=PLAIN))
+    begun = end({"left": 0.5, "right": 0.5}, ("left", "right", "slope"))
+    found = open_ended.with_least_sizes(base, begun)
+    assert set(found.at_least) == {keys["left"]}
+    assert found.at_least[keys["left"]] == pytest.approx(0.3, rel=RESOLVED)
+    assert found.std[keys["left"]] > 3.0 and found.std[keys["right"]] == 0.03
 
 
 def test_a_size_in_two_directions_is_not_looked_at(monkeypatch):

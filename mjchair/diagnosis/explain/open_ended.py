@@ -2,9 +2,11 @@
 
 In: a fit. Out: the fit; where an effect of a far larger size fits as well, at the least size that
 fits alike, with the least size that the data do not rule out, and with a standard error that
-reaches to the far one. Of sizes that runs cannot tell apart, the least is the one that changes the
-chair least where no run has been: a caster that 0.3 N m hold still turns over as the chair
-reverses, one that 2 hold does not.
+reaches to the far one. Left and right sizes are looked at one by one.
+
+Of sizes that runs cannot tell apart, the least is the one that changes the chair least where no run
+has been: a caster that 0.3 N m hold still turns over as the chair reverses, one that 2 hold does
+not.
 """
 
 from __future__ import annotations
@@ -32,10 +34,10 @@ def with_least_sizes(base: Base, fitted: Fitted) -> Fitted:
     """The fit, with `at_least` and standard errors of sizes that are open upwards."""
     best = fitted
     for term in best.variant.terms:
-        p = _one_sided(term)
-        far = None if p is None else _far(term, p)
-        if p is not None and far is not None:
-            fitted = _with_least(base, best, fitted, (term, p, far))
+        for p in _one_sided(term):
+            far = _far(term, p)
+            if far is not None:
+                fitted = _with_least(base, best, fitted, (term, p, far))
     return fitted
 
 
@@ -69,12 +71,14 @@ def _with_least(
     return replace(at, std=std, at_least=fitted.at_least | {key: ends})
 
 
-def _one_sided(term: Term) -> Parameter | None:
-    """The size of an effect that has one only, and in one direction; None: it is no such effect."""
+def _one_sided(term: Term) -> list[Parameter]:
+    """The size of an effect that has one, or its left and its right one, if in one direction."""
     sized = [p for _, p in term.parameters if p.sized]
-    if len(sized) != 1 or sized[0].whole or sized[0].neutral not in (sized[0].low, sized[0].high):
-        return None
-    return sized[0]
+    if len(sized) != 1 and {p.name for p in sized} != {"left", "right"}:
+        return []
+    if any(p.whole or p.neutral not in (p.low, p.high) for p in sized):
+        return []
+    return [p for p in sized if p.name in term.free]
 
 
 def _least(
@@ -98,8 +102,10 @@ def _least(
 
 
 def _held(term: Term, p: Parameter, size: float) -> Term:
-    """The effect at a size that no fit moves."""
-    return Term(term.effect, {**term.values, p.name: size}, ())
+    """The effect at a size that no fit moves; of two sizes the other is free, and no shape is."""
+    sized = {q.name for _, q in term.parameters if q.sized}
+    free = tuple(name for name in term.free if name in sized and name != p.name)
+    return Term(term.effect, {**term.values, p.name: size}, free)
 
 
 def _at(base: Base, fitted: Fitted, held: Term, most: float) -> Fitted | None:
