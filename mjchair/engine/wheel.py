@@ -198,8 +198,9 @@ def act_dyn(m: ModelView, d: DataView, actuator: int) -> None:
     slip_y = vx * lx + vy * ly + vz * lz
     spin = wx * ax + wy * ay + wz * az
     yaw = wx * nx + wy * ny + wz * nz - spin * math.sin(gamma)
-    # MuJoCo's velocities are half a step older than its positions, and so must the heading be that
-    # a speed is resolved in: with the new one a caster shimmies 1 % too fast at 2 ms
+    # MuJoCo's velocities belong to a time half a step before its positions. The heading in which
+    # the slip speed is resolved is turned back to that time, or a caster that shimmies at 2 ms does
+    # so 1 % too fast, and too damped
     slip_y += 0.5 * h * yaw * (slip_x + spin * radius)
 
     new, _, (fx, fy, mx, my, mz) = law.step_tire(

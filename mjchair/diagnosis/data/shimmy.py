@@ -20,8 +20,8 @@ SWING = 0.1  # rad, the least swing from side to side; a sensor scatters less
 FASTEST = 0.35  # s, the longest swing: no person steers so fast (assumption)
 SWINGS = 5  # that follow each other, at least
 ROUND = 0.75  # swings back and forth, to either side of a time, that tell how a caster turns there
-FEWEST = 9  # samples
-RHYTHMS = np.linspace(0.75, 1.3, 23)  # of the median one, of which the best is taken
+FEWEST = 9  # samples that do, at least: a swing that grows or fades has six numbers
+RHYTHMS = np.linspace(0.75, 1.3, 23)  # frequencies that are tried, over that of the median swing
 
 CASTERS = ("left_caster_angle", "right_caster_angle")
 
@@ -60,15 +60,21 @@ def turned(trial: Trial, channel: str, when: float, swing: float) -> Turned:
       swing: about how long one lasts from side to side, s.
     """
     time, angle = trial.samples(channel)
-    fits = [_harmonic(time - when, np.unwrap(angle), np.pi / swing * r) for r in RHYTHMS]
+    near = np.argsort(np.abs(time - when))
+    t, a = time[near] - when, np.unwrap(angle)[near]
+    rate, fits = trial.rate(channel), []
+    for omega in np.pi / swing * RHYTHMS:
+        count = max(round(4.0 * np.pi * ROUND / omega * rate), FEWEST)
+        fits.append(_harmonic(t[:count], a[:count], omega))
     return min(fits, key=lambda fit: fit[0])[1]
 
 
-def _harmonic(time: Array, angle: Array, omega: float) -> tuple[float, Turned]:
-    """Mean square that a swing of omega (rad/s) leaves, and how a caster turns at time 0."""
-    count = round(2.0 * ROUND * 2.0 * np.pi / omega / float(np.median(np.diff(time))))
-    near = np.argsort(np.abs(time))[: max(count, FEWEST)]
-    t, a = time[near], angle[near]
+def _harmonic(t: Array, a: Array, omega: float) -> tuple[float, Turned]:
+    """Mean square that a swing of omega (rad/s) leaves, and how a caster turns at time 0.
+
+    Args:
+      t: s. a: angles, rad, (n,) each.
+    """
     cos, sin = np.cos(omega * t), np.sin(omega * t)
     basis = np.column_stack([np.ones_like(t), t, cos, sin, t * cos, t * sin])
     c = np.linalg.lstsq(basis, a)[0]

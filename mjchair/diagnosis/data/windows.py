@@ -28,8 +28,8 @@ LENGTH = 2.0  # s, of a window
 SWINGS = 6
 SHORT = (0.2, 0.7)  # s, within which such windows are
 LEAD = 0.2  # s
-# s, where one does: how casters swing is a part of their state and settles on nothing, and with
-# 0.2 s chi2 over the size of an effect is as rough again
+# s, lead of a window in which a caster shimmies: how it swings is a part of the state and need not
+# settle, and over 0.2 s it gets out of step
 BRIEF = 0.06
 FEWEST = 5  # samples of a window
 
@@ -82,6 +82,11 @@ def calm(windows: Sequence[Window], which: Collection[int]) -> list[int]:
     """Of some windows, those in which no caster shimmies; all of them where every one does."""
     quiet = [int(i) for i in which if not windows[i].shimmies]
     return quiet or [int(i) for i in which]
+
+
+def shimmying(windows: Sequence[Window]) -> bool:
+    """Whether a caster shimmies in any of the windows."""
+    return any(w.shimmies for w in windows)
 
 
 def _length(usual: float, shaken: Sequence[shimmy.Stretch]) -> float:

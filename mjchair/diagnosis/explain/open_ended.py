@@ -34,7 +34,7 @@ def with_least_sizes(base: Base, fitted: Fitted) -> Fitted:
     """The fit, with `at_least` and standard errors of sizes that are open upwards."""
     best = fitted
     for term in best.variant.terms:
-        for p in _one_sided(term):
+        for p in _one_sided_sizes(term):
             far = _far(term, p)
             if far is not None:
                 fitted = _with_least(base, best, fitted, (term, p, far))
@@ -71,7 +71,7 @@ def _with_least(
     return replace(at, std=std, at_least=fitted.at_least | {key: ends})
 
 
-def _one_sided(term: Term) -> list[Parameter]:
+def _one_sided_sizes(term: Term) -> list[Parameter]:
     """The size of an effect that has one, or its left and its right one, if in one direction."""
     sized = [p for _, p in term.parameters if p.sized]
     if len(sized) != 1 and {p.name for p in sized} != {"left", "right"}:

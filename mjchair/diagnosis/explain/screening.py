@@ -15,7 +15,7 @@ import numpy as np
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.data import first_state, roughly_known
 from mjchair.diagnosis.data.study import Study, with_copied_wheels
-from mjchair.diagnosis.data.windows import calm
+from mjchair.diagnosis.data.windows import calm, shimmying
 from mjchair.diagnosis.explain import candidates, hypotheses, missing_force, noise_shown
 from mjchair.diagnosis.explain import gap as gaps
 from mjchair.diagnosis.explain.candidates import Around, Start
@@ -142,9 +142,8 @@ def screen_columns(
         plain = refit(bench, plain.variant, plain.track)
     _check_told(plain)
     # a nuisance far from its prior stands in for something else: then the chair as given is nearer,
-    # as it is where casters shimmy: for a relaxation length stood the stiffness of their tires
-    shimmies = any(w.shimmies for w in simulator.windows)
-    if not shimmies and not rules.is_far(_farthest(plain)):
+    # as it is where casters shimmy: the stiffness of their tires stood in for a relaxation length
+    if not shimmying(simulator.windows) and not rules.is_far(_farthest(plain)):
         variant, here, nuisances = plain.variant, plain.track, plain.columns
     around = Around(bench=bench, track=here, variant=variant, pulses=asked, answers=answers)
     tried = candidates.collect(around, effects, lambda key: say(f"effect {key}"))

@@ -21,6 +21,7 @@ import numpy as np
 
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.data.shimmy import CASTERS
+from mjchair.diagnosis.data.windows import shimmying
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit import bounded
@@ -54,7 +55,7 @@ class Seen:
 
 def shimmies(base: Base) -> bool:
     """Whether a caster shimmies in any window."""
-    return any(w.shimmies for w in base.bench.simulator.windows)
+    return shimmying(base.bench.simulator.windows)
 
 
 def shimmies_as_measured(base: Base, here: Track) -> bool:

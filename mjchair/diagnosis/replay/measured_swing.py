@@ -8,7 +8,6 @@ that the swivels accelerate as measured: the angle alone leaves the swing's phas
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -24,13 +23,6 @@ ASIDE = 0.003  # m, by which a caster's tire gives way to show what it does to i
 FURTHEST = 0.02  # m, that it may give way
 
 Measured = Mapping[int, list[Turned | None]]  # by window: the left and right caster; None: not seen
-
-
-class Swivels(NamedTuple):
-    """Accelerations (rad/s^2) of the left and right swivel."""
-
-    left: float
-    right: float
 
 
 def states(
@@ -90,14 +82,13 @@ def _deflected(
 
 def _accelerations(
     simulator: WindowSimulator, model: mujoco.MjModel, some: Mapping[int, State]
-) -> dict[int, Swivels]:
-    """Of the swivels in the first step of windows that begin at states."""
+) -> dict[int, Array]:
+    """Of the left and right swivel in the first step of windows, rad/s^2, (2,) each."""
     jobs = [Job(model, simulator.windows[i], state) for i, state in some.items()]
     outcomes = simulator.run(jobs, trace=STATE) if jobs else []
     dofs, out = simulator.chair.swivel_dof, {}
     for (i, state), outcome in zip(some.items(), outcomes, strict=True):
         inside = simulator.in_run(model, simulator.windows[i].run)
         after = simulator.carrier.back(inside, outcome.trace, 0)
-        rates = (after.qvel[dofs] - state.qvel[dofs]) / model.opt.timestep
-        out[i] = Swivels(*(float(rate) for rate in rates))
+        out[i] = (after.qvel[dofs] - state.qvel[dofs]) / model.opt.timestep
     return out
