@@ -10,7 +10,8 @@ from mjchair.diagnosis.data.study import Run, make_study
 from mjchair.diagnosis.replay import noise
 from mjchair.diagnosis.replay.chair_state import SHIMMY, SLOW
 from mjchair.diagnosis.replay.simulator import WindowSimulator
-from mjchair.diagnosis.replay.window_states import prior, track
+from mjchair.diagnosis.replay.window_search import prior
+from mjchair.diagnosis.replay.window_states import track
 from mjchair.effects import relaxation_length
 from mjchair.measurement.trial import Trial
 from mjchair.simulation.initial import Initial

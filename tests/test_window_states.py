@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mjchair.diagnosis.replay import window_states
+from mjchair.diagnosis.replay import window_search, window_states
 from mjchair.diagnosis.replay.chair_state import SLOW, STEPS
 from mjchair.diagnosis.replay.noise import Noise
 
@@ -15,11 +15,22 @@ WHITE = np.array([0.01, 0.02])
 SLOPE = np.linspace(0.0, 1.0, 50)
 
 
+def _chair(simulator, errors):
+    return window_search.Searched(
+        simulator=simulator,
+        model="fine",
+        coarse="coarse",
+        errors=errors,
+        white=[WHITE] * len(simulator.windows),
+        kept=True,
+    )
+
+
 @pytest.fixture
 def step(monkeypatch):
     """A step of a state of which one part turns the chair, for a residual (rows, channels)."""
-    monkeypatch.setattr(window_states, "prior", lambda *_: np.ones(len(SLOW)))
-    monkeypatch.setattr(window_states, "residual", lambda measured, seen, _: measured - seen)
+    monkeypatch.setattr(window_search, "prior", lambda *_: np.ones(len(SLOW)))
+    monkeypatch.setattr(window_search, "residual", lambda measured, seen, _: measured - seen)
     slow = np.zeros((50, 2, len(SLOW)))
     slow[:, 1, 4] = SLOPE
 
@@ -28,9 +39,9 @@ def step(monkeypatch):
             channels=CHANNELS, windows=[None], measured=lambda _: miss, chair=None
         )
         seen = np.zeros((50, 2))
-        size = window_states._size(simulator, None, seen, WHITE)
-        search = window_states.Search(None, None, size, predicted=seen)
-        return window_states._step(simulator, 0, search, slow, WHITE)
+        size = window_search.misfit(simulator, None, seen, WHITE)
+        search = window_search.Search(None, None, size, predicted=seen, slow=slow)
+        return window_search._step(simulator, 0, search, WHITE)
 
     return promised
 
@@ -56,25 +67,25 @@ def test_a_step_promises_what_it_explains(step):
 @pytest.mark.parametrize(
     ("promise", "stands", "kept", "rounds"),
     [
-        (window_states.PROMISE, False, False, 0),  # what it promises, the elimination does
-        (5.0, False, False, window_states.ROUNDS + window_states.MORE),
-        (5.0, True, False, window_states.ROUNDS),  # at rest a chair answers in steps
-        (5.0, False, True, window_states.ROUNDS),  # answers of another chair lead astray
+        (window_search.PROMISE, False, False, 0),  # what it promises, the elimination does
+        (5.0, False, False, window_search.ROUNDS + window_search.MORE),
+        (5.0, True, False, window_search.ROUNDS),  # at rest a chair answers in steps
+        (5.0, False, True, window_search.ROUNDS),  # answers of another chair lead astray
     ],
 )
 def test_how_long_a_window_goes_on(promise, stands, kept, rounds):
-    search = window_states.Search(None, None, promise=promise)
-    going = [window_states._goes_on(search, k, kept, stands) for k in range(9)]
+    search = window_search.Search(None, None, promise=promise)
+    going = [window_search._goes_on(search, k, kept, stands) for k in range(9)]
     assert going == [True] * rounds + [False] * (9 - rounds)
     search.calm = True
-    assert not window_states._goes_on(search, 0, kept, stands)
+    assert not window_search._goes_on(search, 0, kept, stands)
 
 
 @pytest.mark.parametrize(("size", "rounds"), [(np.inf, 1), (100.0, 1), (40.0, 10)])
 def test_the_state_of_a_shimmy_is_sought_longer_but_not_for_a_little_of_its_misfit(size, rounds):
     """A step promises 5; of a chair that is not right the rest is not for the state."""
-    search = window_states.Search(None, None, size, promise=5.0, shimmies=True)
-    going = [window_states._goes_on(search, k, False, False) for k in range(12)]
+    search = window_search.Search(None, None, size, promise=5.0, shimmies=True)
+    going = [window_search._goes_on(search, k, False, False) for k in range(12)]
     assert going == [True] * rounds + [False] * (12 - rounds)
 
 
@@ -85,7 +96,7 @@ def test_a_chair_that_a_channel_sees_roll_does_not_stand(slow, rolls, stands):
     """A step of a fit that led to rest held a chair there that rolled: chi2 of 70 000 in 2 s."""
     chair = SimpleNamespace(stands=lambda _: slow)
     simulator = SimpleNamespace(chair=chair, rolls=[rolls])
-    assert window_states._stands(simulator, 0, None) == stands
+    assert window_search.stands(simulator, 0, None) == stands
 
 
 def test_what_a_wrong_chair_misses_tells_less_of_a_state_that_no_channel_sees(step):
@@ -97,7 +108,7 @@ def test_what_a_wrong_chair_misses_tells_less_of_a_state_that_no_channel_sees(st
     more, promise = step(weak + louder)
     alone, _ = step(louder)
     assert abs(more[4] - alone[4]) < 0.2 * abs(change[4])
-    assert promise > window_states.PROMISE
+    assert promise > window_search.PROMISE
 
 
 def test_a_step_that_promised_much_and_failed_is_made_anew_with_small_changes(monkeypatch):
@@ -109,22 +120,21 @@ def test_a_step_that_promised_much_and_failed_is_made_anew_with_small_changes(mo
         return {i: "new" for i in states}
 
     worse = SimpleNamespace(predicted=None, trace={})
-    monkeypatch.setattr(window_states, "_traced", lambda *_: {0: worse, 1: worse})
-    monkeypatch.setattr(window_states, "_size", lambda *_: 9.0)
-    monkeypatch.setattr(window_states, "answers", answers)
-    monkeypatch.setattr(window_states, "_step", lambda *_: (np.ones(len(SLOW)), 5.0))
+    monkeypatch.setattr(window_search, "_traced", lambda *_: {0: worse, 1: worse})
+    monkeypatch.setattr(window_search, "misfit", lambda *_: 9.0)
+    monkeypatch.setattr(window_search, "answers", answers)
+    monkeypatch.setattr(window_search, "_step", lambda *_: (np.ones(len(SLOW)), 5.0))
     chair = SimpleNamespace(stands=lambda _: False, moved=lambda state, change: change)
     simulator = SimpleNamespace(windows=[None, None], chair=chair, rolls=[True, True])
     errors = SimpleNamespace(applied=lambda *_: None)
-    going = {k: window_states.Search("tried", "best", 4.0) for k in range(2)}
+    going = {k: window_search.Search("tried", "best", 4.0, slow="old") for k in range(2)}
     going[0].promise, going[1].promise = 2.0, 0.3
-    slow = ["old", "old"]
-    arguments = (simulator, ("fine", "coarse"), errors, going, WHITE, slow, True)
-    window_states._fit_round(*arguments)
-    assert asked == [("fine", 0, window_states.FINER)] and slow == ["new", "old"]
+    window_search._fit_round(_chair(simulator, errors), going)
+    assert asked == [("fine", 0, window_search.FINER)]
+    assert [search.slow for search in going.values()] == ["new", "old"]
     assert going[0].touchy and not going[1].touchy
-    assert window_states._goes_on(going[0], window_states.ROUNDS, kept=True, stands=False)
-    assert not window_states._goes_on(going[1], window_states.ROUNDS, kept=True, stands=False)
+    assert window_search._goes_on(going[0], window_search.ROUNDS, kept=True, stands=False)
+    assert not window_search._goes_on(going[1], window_search.ROUNDS, kept=True, stands=False)
 
 
 @pytest.mark.parametrize(
@@ -146,17 +156,15 @@ def test_answers_are_made_anew_where_a_step_brings_less_than_they_promise(
         return dict.fromkeys(states, "new")
 
     shown = SimpleNamespace(predicted=None, trace={})
-    monkeypatch.setattr(window_states, "_traced", lambda *_: {0: shown})
-    monkeypatch.setattr(window_states, "_size", lambda *_: size)
-    monkeypatch.setattr(window_states, "answers", answers)
-    monkeypatch.setattr(window_states, "_step", lambda *_: (np.ones(len(SLOW)), 5.0))
+    monkeypatch.setattr(window_search, "_traced", lambda *_: {0: shown})
+    monkeypatch.setattr(window_search, "misfit", lambda *_: size)
+    monkeypatch.setattr(window_search, "answers", answers)
+    monkeypatch.setattr(window_search, "_step", lambda *_: (np.ones(len(SLOW)), 5.0))
     chair = SimpleNamespace(stands=lambda _: False, moved=lambda state, change: change)
     simulator = SimpleNamespace(windows=[None], chair=chair, rolls=[True])
     errors = SimpleNamespace(applied=lambda *_: None)
-    search = window_states.Search("tried", "best", 9.0, touchy=True, fresh=fresh, promise=8.0)
-    window_states._fit_round(
-        simulator, ("fine", "coarse"), errors, {0: search}, WHITE, ["old"], True
-    )
+    search = window_search.Search("tried", "best", 9.0, touchy=True, fresh=fresh, promise=8.0)
+    window_search._fit_round(_chair(simulator, errors), {0: search})
     assert asked == ([0] if anew else [])
 
 
@@ -164,7 +172,7 @@ def test_answers_are_made_anew_where_a_step_brings_less_than_they_promise(
 def test_what_a_window_cannot_tell_is_not_simulated(placed, shimmies, monkeypatch):
     """The prior of a position that no channel sees holds it."""
     seen = np.r_[placed, placed, True, True, True, True, False]
-    monkeypatch.setattr(window_states.first_state, "observed", lambda _: seen)
+    monkeypatch.setattr(window_search.first_state, "observed", lambda _: seen)
 
     def run(jobs):  # each channel shows the sum of the state
         return [SimpleNamespace(predicted=np.full((4, 2), job.state.sum())) for job in jobs]
@@ -177,7 +185,7 @@ def test_what_a_window_cannot_tell_is_not_simulated(placed, shimmies, monkeypatc
     )
     errors = SimpleNamespace(applied=lambda _simulator, _window, predicted: predicted)
     states = {0: np.ones(len(SLOW))}
-    (answers,) = window_states.answers(simulator, None, errors, states, 0.5).values()
+    (answers,) = window_search.answers(simulator, None, errors, states, 0.5).values()
     # a caster that is not seen is told later; how one swings, only where it is seen to shimmy
     told = [placed, placed, True, True, True, True, True, shimmies, False, shimmies, False]
     expected = np.where(told, STEPS, 0.0)
@@ -191,16 +199,17 @@ def test_the_states_of_a_hopeless_chair_are_not_sought(monkeypatch):
     shown = SimpleNamespace(predicted=np.full((4, 2), 1e4), trace={})
     monkeypatch.setattr(window_states, "installed", contextlib.nullcontext)
     monkeypatch.setattr(window_states, "SensorErrors", lambda _: SimpleNamespace())
-    monkeypatch.setattr(window_states, "_stands", lambda *_: False)
-    monkeypatch.setattr(window_states, "_traced", lambda *_: {0: shown})
-    monkeypatch.setattr(window_states, "_size", lambda _s, _w, seen, _n: float(seen.sum()))
+    monkeypatch.setattr(window_search, "stands", lambda *_: False)
+    monkeypatch.setattr(window_search, "_traced", lambda *_: {0: shown})
+    for module in (window_search, window_states):
+        monkeypatch.setattr(module, "misfit", lambda _s, _w, seen, _n: float(seen.sum()))
 
-    def one(simulator, models, errors, going, *rest):
+    def one(chair, going):
         rounds.append(len(going))
         for search in going.values():
             search.judge(misfit[0], shown.predicted, {})
 
-    monkeypatch.setattr(window_states, "_fit_round", one)
+    monkeypatch.setattr(window_search, "_fit_round", one)
     simulator = SimpleNamespace(
         channels=CHANNELS,
         windows=[SimpleNamespace(index=0, rows=np.arange(4), shimmies=False)],
@@ -209,7 +218,7 @@ def test_the_states_of_a_hopeless_chair_are_not_sought(monkeypatch):
     errors = SimpleNamespace(applied=lambda _simulator, _window, predicted: predicted)
     noise = dict.fromkeys(CHANNELS, Noise(1.0, 0.0, 1.0, "given"))
     limit = window_states.HOPELESS * 8.0  # samples: the chair before misses none
-    for size, expected in ((0.9 * limit, window_states.ROUNDS), (1.1 * limit, 1)):
+    for size, expected in ((0.9 * limit, window_search.ROUNDS), (1.1 * limit, 1)):
         rounds.clear()
         misfit[0] = size
         found = window_states.track(simulator, "model", noise, errors, before)

@@ -21,7 +21,8 @@ from mjchair.diagnosis.fit.process import Process
 from mjchair.diagnosis.fit.whitening import Whitener
 from mjchair.diagnosis.replay.chair_state import SLOW, STEPS
 from mjchair.diagnosis.replay.simulator import WindowSimulator
-from mjchair.diagnosis.replay.window_states import Track, prior, zero_columns
+from mjchair.diagnosis.replay.window_search import prior, zero_columns
+from mjchair.diagnosis.replay.window_states import Track
 
 Array = NDArray[np.float64]
 RIDGE = 1e-9

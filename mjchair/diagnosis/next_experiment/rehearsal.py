@@ -28,7 +28,8 @@ from mjchair.diagnosis.replay.derivatives import Column
 from mjchair.diagnosis.replay.pulses import Pulse, pulse_answers, pulses
 from mjchair.diagnosis.replay.sensor_errors import SensorErrors
 from mjchair.diagnosis.replay.simulator import STATE, Job, Outcome, WindowSimulator
-from mjchair.diagnosis.replay.window_states import Track, answers
+from mjchair.diagnosis.replay.window_search import answers
+from mjchair.diagnosis.replay.window_states import Track
 from mjchair.effects.effect import SensorError
 from mjchair.engine.install import installed
 from mjchair.measurement.trial import Trial
