@@ -21,10 +21,10 @@ from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.effects.library import find
 from mjchair.errors import MjchairError
 
-GAIN = find("torque_gain")
-NAMES = ("left", "right")
+WIND = find("wind")
+NAMES = ("x", "y")
 TRUTH = np.array([0.5, 0.0])
-# chi2 is long and narrow: two gains that grow together change little
+# chi2 is long and narrow: two speeds that grow together change little
 ALONG, ACROSS = np.array([1.0, 0.7]), np.array([-0.7, 1.0])
 BASE = SimpleNamespace(bench=None, nuisances={})
 
@@ -37,7 +37,7 @@ def chi2(sizes):
 def told(sizes, free, promised):
     values = dict(zip(NAMES, map(float, sizes), strict=True))
     return Fitted(
-        variant=Variant((), terms=(Term(GAIN, values, free),)),
+        variant=Variant((), terms=(Term(WIND, values, free),)),
         track=None,
         columns={},
         system=None,
@@ -45,8 +45,8 @@ def told(sizes, free, promised):
         chi2=np.zeros(0),
         total=float(chi2(sizes)),
         promised=promised,
-        std={ParameterId("torque_gain", name): 0.01 for name in free},
-        sigmas={"torque_gain": 40.0},
+        std={ParameterId("wind", name): 0.01 for name in free},
+        sigmas={"wind": 40.0},
         at_bound=(),
     )
 
@@ -84,9 +84,9 @@ def test_a_stuck_fit_goes_along_the_valley_and_its_errors_cover(stuck):
     assert end.variant.terms[0].free == NAMES
     for name, truth in zip(NAMES, TRUTH, strict=True):
         away = abs(end.variant.terms[0].values[name] - truth)
-        assert away < 3.0 * end.std[ParameterId("torque_gain", name)]
-        assert end.std[ParameterId("torque_gain", name)] > 0.02
-    assert end.sigmas["torque_gain"] < 40.0
+        assert away < 3.0 * end.std[ParameterId("wind", name)]
+        assert end.std[ParameterId("wind", name)] > 0.02
+    assert end.sigmas["wind"] < 40.0
 
 
 def test_a_fit_that_is_not_stuck_is_left_as_it_is(stuck):
@@ -98,31 +98,49 @@ def test_a_fit_that_is_not_stuck_is_left_as_it_is(stuck):
 def test_of_sizes_that_make_up_for_one_another_chi2_tells_the_errors(stuck, sign):
     """Fits of one wind from four starts ended within 2 of chi2 and 4 standard errors apart."""
     begun = told(TRUTH, NAMES, promised=chi2(TRUTH))
-    pair = frozenset(ParameterId("torque_gain", name) for name in NAMES)
+    pair = frozenset(ParameterId("wind", name) for name in NAMES)
     loosely = replace(begun, correlation={pair: 0.8 * sign})
     assert profile.followed(BASE, loosely) is loosely
     end = profile.followed(BASE, replace(begun, correlation={pair: 0.97 * sign}))
     for key in pair:
         assert end.std[key] == pytest.approx(3.0 * begun.std[key], rel=0.1)  # chi2 hardly rises
-    assert end.sigmas["torque_gain"] == pytest.approx(begun.sigmas["torque_gain"] / 3.0, rel=0.1)
+    assert end.sigmas["wind"] == pytest.approx(begun.sigmas["wind"] / 3.0, rel=0.1)
 
 
 @pytest.mark.parametrize(("ratio", "asked"), [(0.5, True), (1.2, False), (2.0, True)])
 def test_where_two_sides_say_different_errors_chi2_tells_them(stuck, monkeypatch, ratio, asked):
     """A column that is taken across a jump told a camber eight times as well as it was known."""
-    left, right = (ParameterId("torque_gain", name) for name in NAMES)
+    x, y = (ParameterId("wind", name) for name in NAMES)
     begun = told(TRUTH, NAMES, promised=chi2(TRUTH))
-    other = {left: ratio * begun.std[left], right: begun.std[right]}
+    other = {x: ratio * begun.std[x], y: begun.std[y]}
     monkeypatch.setattr(profile, "from_other_side", lambda *_: other)
     end = profile.followed(BASE, begun)
     if not asked:
         assert end is begun
         return
-    away = profile.AWAY * max(other[left], begun.std[left])
+    away = profile.AWAY * max(other[x], begun.std[x])
     best = min(chi2(np.add(TRUTH, (away, b))) for b in np.linspace(-0.1, 0.1, 2001)) - chi2(TRUTH)
-    assert end.std[left] == pytest.approx(away / math.sqrt(max(best, 1.0)), rel=0.01)
-    assert end.std[right] == begun.std[right]
-    assert end.sigmas["torque_gain"] == pytest.approx(40.0 * begun.std[left] / end.std[left])
+    assert end.std[x] == pytest.approx(away / math.sqrt(max(best, 1.0)), rel=0.01)
+    assert end.std[y] == begun.std[y]
+    assert end.sigmas["wind"] == pytest.approx(40.0 * begun.std[x] / end.std[x])
+
+
+@pytest.mark.parametrize("together", [0.0, 0.5, -0.9])
+def test_two_sides_make_up_for_one_another_as_their_mean_and_difference_do(together):
+    """The radius of both wheels is roughly known: left and right correlate by 0.9995."""
+    mean, difference = 1.5, 0.02  # mm
+    shared = together * mean * difference
+    left, right = (math.sqrt(mean**2 + difference**2 + s * 2.0 * shared) for s in (1.0, -1.0))
+    r = (mean**2 - difference**2) / (left * right)
+    pair = tuple(ParameterId("wheel_radius", side) for side in ("left", "right"))
+    fitted = replace(
+        told(TRUTH, NAMES, 3000.0),
+        std=dict(zip(pair, (left, right), strict=True)),
+        correlation={frozenset(pair): r},
+    )
+    assert r > 0.999
+    assert abs(profile._together(fitted, frozenset(pair))) == pytest.approx(abs(together), abs=1e-6)
+    assert profile._make_up(fitted) == (set(pair) if abs(together) > profile.MAKES_UP else set())
 
 
 def test_a_number_that_is_no_size_is_known_no_better_than_what_makes_up_for_it():
@@ -173,7 +191,7 @@ def test_no_size_is_told_better_than_the_form_of_its_effect(name, value, own, le
 
 def test_what_two_sides_differ_by_is_known_as_their_correlation_says():
     fitted = told((0.5, 0.3), NAMES, 0.0)
-    one, other = (ParameterId("torque_gain", name) for name in NAMES)
+    one, other = (ParameterId("wind", name) for name in NAMES)
     assert fitted.std_of_difference(one, other) == 0.0  # it was not looked at
     for correlation, std in ((1.0, 0.0), (0.0, 0.01 * 2.0**0.5), (-1.0, 0.02)):
         near = replace(fitted, correlation={frozenset((one, other)): correlation})

@@ -33,7 +33,8 @@ from mjchair.diagnosis.explain.multistart import made_anew
 from mjchair.diagnosis.explain.screening import Base, nuisances_of
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted, from_other_side
-from mjchair.effects.effect import Parameter
+from mjchair.diagnosis.fit.variant import Term
+from mjchair.effects.effect import Parameter, clip
 from mjchair.errors import MjchairError
 
 AWAY = 3.0  # standard errors that a size is held beside where it was found, at first
@@ -94,7 +95,22 @@ def followed(base: Base, fitted: Fitted) -> Fitted:
 
 def _make_up(fitted: Fitted) -> set[ParameterId]:
     """The numbers that make up for another one of their effect."""
-    return {key for pair, r in fitted.correlation.items() if abs(r) > MAKES_UP for key in pair}
+    pairs = fitted.correlation
+    return {key for pair in pairs if abs(_together(fitted, pair)) > MAKES_UP for key in pair}
+
+
+def _together(fitted: Fitted, pair: frozenset[ParameterId]) -> float:
+    """Correlation of two numbers; of a left and a right one that of their mean and difference.
+
+    What both sides share is often only roughly known, as the radius of both wheels is, and makes
+    left and right correlate though neither makes up for the other.
+    """
+    r, (one, other) = fitted.correlation[pair], pair
+    if {one.parameter, other.parameter} != {"left", "right"}:
+        return r
+    a, b = fitted.std[one], fitted.std[other]
+    across = math.sqrt((a * a + b * b) ** 2 - (2.0 * r * a * b) ** 2)
+    return (a * a - b * b) / max(across, 1e-300)
 
 
 def _two_sided(base: Base, fitted: Fitted) -> dict[ParameterId, float]:
@@ -140,7 +156,7 @@ def _held(base: Base, fitted: Fitted, key: ParameterId, side: float, away: float
     terms = tuple(
         replace(
             t,
-            values={**t.values, key.parameter: size},
+            values={**t.values, **_along(fitted, t, key, side * away), key.parameter: size},
             free=tuple(name for name in t.free if name != key.parameter),
         )
         if t.effect.key == key.effect
@@ -150,6 +166,19 @@ def _held(base: Base, fitted: Fitted, key: ParameterId, side: float, away: float
     start, nuisances = replace(fitted.variant, terms=terms), nuisances_of(base, fitted)
     there = made_anew(base.bench, start, fitted.track, nuisances)
     return None if there is None else Held(key, side, size, there)
+
+
+def _along(fitted: Fitted, term: Term, key: ParameterId, by: float) -> dict[str, float]:
+    """Where the other numbers of an effect go, by their correlation, with one of them.
+
+    Args:
+      key: which. by: how many standard errors it goes.
+    """
+    out = {}
+    for other, p in term.parameters:
+        r = fitted.correlation.get(frozenset((key, other)), 0.0)
+        out[p.name] = clip(p, term.values[p.name] + r * by * fitted.std[other])
+    return out
 
 
 def _freed(base: Base, held: Fitted, like: Fitted) -> Fitted | None:
