@@ -159,6 +159,50 @@ def test_a_number_that_is_no_size_is_known_no_better_than_what_makes_up_for_it()
     assert end.std == pytest.approx({x: 0.5, area: 0.05 * 0.9 * 2.5})
 
 
+@pytest.mark.parametrize(
+    ("size", "lost", "sigmas"),
+    [
+        (0.25, 81.0, 9.0),  # half of it is ruled out by 9 standard errors
+        (0.25, 4.0, 5.0),
+        (-0.1, 81.0, 5.0),  # beyond no effect: that says nothing of less of it
+        (0.7, 81.0, 5.0),
+        (0.25, 1e4, 40.0),  # no more than was said before
+    ],
+)
+def test_an_effect_is_as_certain_as_less_of_it_loses(size, lost, sigmas):
+    """A load is 17 to 27 kg: 2 standard errors from none, and 9 kg lost 56 of chi2."""
+    fitted = told(TRUTH, NAMES, 3000.0)
+    x = ParameterId("wind", "x")
+    wider = profile._widened(fitted, {key: 8.0 * std for key, std in fitted.std.items()})
+    assert wider.sigmas["wind"] == 5.0
+    seen = [profile.Held(x, -1.0, size, replace(fitted, total=fitted.total + lost))]
+    assert profile._as_lost(wider, fitted, seen).sigmas["wind"] == pytest.approx(sigmas)
+
+
+@pytest.mark.parametrize(("moved", "asked"), [(0.5, False), (1.6, True), (-1.6, True)])
+def test_a_load_beside_a_mass_that_was_moved_is_asked(moved, asked):
+    """Chi2 between them was flat, and columns told the load to 1.2 kg: 16 kg of 25."""
+    load = find("payload")
+    term = Term(load, load.neutral(), ("mass", "height"))
+    fitted = replace(
+        told(TRUTH, NAMES, 3000.0), variant=Variant((), offsets={"mass": moved}, terms=(term,))
+    )
+    asked_of = {key.parameter for key in profile._stood_in_for(fitted)}
+    assert asked_of == ({"mass", "height"} if asked else set())
+
+
+def test_a_valley_that_is_flat_is_followed(stuck):
+    """Where a size far away fits alike, columns that are made there may show a way down."""
+    begun = told(TRUTH, NAMES, promised=chi2(TRUTH))
+    freed = []
+    one = profile._freed
+    pair = frozenset(ParameterId("wind", name) for name in NAMES)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(profile, "_freed", lambda *a: freed.append(a) or one(*a))
+        profile.followed(BASE, replace(begun, correlation={pair: 0.97}))
+    assert freed
+
+
 def test_where_no_chair_is_beside_it_a_fit_stays(monkeypatch):
     def never(*_, **__):
         raise MjchairError("no chair")

@@ -41,6 +41,7 @@ AWAY = 3.0  # standard errors that a size is held beside where it was found, at 
 FARTHER = 2.0  # times that, where this led on
 MAKES_UP = 0.85  # correlation of two numbers of one effect, beyond which chi2 is asked (assumption)
 UNEVEN = 1.5  # ratio of a size's standard errors by its two sides, beyond which chi2 is asked
+MOVED = 1.0  # standard deviations of what is roughly known, beyond which chi2 is asked
 ROUNDS = 3  # of holding sizes and freeing the best
 
 
@@ -71,7 +72,7 @@ def followed(base: Base, fitted: Fitted) -> Fitted:
     if not sizes:
         return fitted
     two_sided = _two_sided(base, fitted)
-    doubtful = _make_up(fitted) | _uneven(fitted.std, two_sided)
+    doubtful = _make_up(fitted) | _uneven(fitted.std, two_sided) | _stood_in_for(fitted)
     looked = [key for key in sizes if stuck or key in doubtful]
     if not looked:
         return fitted
@@ -82,7 +83,7 @@ def followed(base: Base, fitted: Fitted) -> Fitted:
         held = [h for h in (_held(base, path[-1], *s, away) for s in sides) if h is not None]
         seen += held
         least = min(held, key=lambda h: h.fitted.total, default=None)
-        if least is None or least.fitted.total >= path[-1].total - rules.NOTHING:
+        if least is None or least.fitted.total >= path[-1].total + rules.TIE:
             break
         freed = _freed(base, least.fitted, fitted)
         if freed is None or freed.total >= path[-1].total:
@@ -111,6 +112,20 @@ def _together(fitted: Fitted, pair: frozenset[ParameterId]) -> float:
     a, b = fitted.std[one], fitted.std[other]
     across = math.sqrt((a * a + b * b) ** 2 - (2.0 * r * a * b) ** 2)
     return (a * a - b * b) / max(across, 1e-300)
+
+
+def _stood_in_for(fitted: Fitted) -> set[ParameterId]:
+    """The numbers of effects in whose place something roughly known was moved as well.
+
+    A load on the chair and the mass of the chair differ by little of each of their columns.
+    """
+    offsets = fitted.variant.offsets
+    return {
+        key
+        for term in fitted.variant.terms
+        if any(abs(offsets.get(name, 0.0)) > MOVED for name in term.effect.instead)
+        for key, _ in term.parameters
+    }
 
 
 def _two_sided(base: Base, fitted: Fitted) -> dict[ParameterId, float]:
@@ -204,7 +219,27 @@ def _with_errors(fitted: Fitted, last: Fitted, seen: Sequence[Held]) -> Fitted:
         std[key] = max(std[key], abs(size - _value(fitted, key)) / math.sqrt(differs))
     for key in std.keys() - _sizes(fitted).keys():  # no size: as far as it makes up for one
         std[key] *= max([1.0, *_wider(fitted, key, std)])
-    return _widened(fitted, std)
+    return _as_lost(_widened(fitted, std), fitted, seen)
+
+
+def _as_lost(wider: Fitted, fitted: Fitted, seen: Sequence[Held]) -> Fitted:
+    """The fit with wider errors, its effects as certain as what less of them loses in chi2 says.
+
+    Between 17 and 27 kg chi2 of a load hardly changes, and below it rises steeply.
+
+    Args:
+      fitted: the fit with the errors that it had. seen: fits with one size held.
+    """
+    sigmas = dict(wider.sigmas)
+    for held in seen:
+        neutral = _sizes(fitted)[held.key].neutral
+        less, size = held.size - neutral, _value(fitted, held.key) - neutral
+        if abs(less) >= abs(size) or less * size < 0.0:
+            continue
+        lost = math.sqrt(max(held.fitted.total - fitted.total, 0.0))
+        effect = held.key.effect
+        sigmas[effect] = max(sigmas[effect], min(lost, fitted.sigmas[effect]))
+    return replace(wider, sigmas=sigmas)
 
 
 def _widened(fitted: Fitted, std: Mapping[ParameterId, float]) -> Fitted:
