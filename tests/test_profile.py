@@ -179,16 +179,21 @@ def test_an_effect_is_as_certain_as_less_of_it_loses(size, lost, sigmas):
     assert profile._as_lost(wider, fitted, seen).sigmas["wind"] == pytest.approx(sigmas)
 
 
-@pytest.mark.parametrize(("moved", "asked"), [(0.5, False), (1.6, True), (-1.6, True)])
-def test_a_load_beside_a_mass_that_was_moved_is_asked(moved, asked):
+def test_all_numbers_of_a_load_are_asked_since_a_mass_stands_in_for_it(stuck, monkeypatch):
     """Chi2 between them was flat, and columns told the load to 1.2 kg: 16 kg of 25."""
-    load = find("payload")
-    term = Term(load, load.neutral(), ("mass", "height"))
-    fitted = replace(
-        told(TRUTH, NAMES, 3000.0), variant=Variant((), offsets={"mass": moved}, terms=(term,))
-    )
-    asked_of = {key.parameter for key in profile._stood_in_for(fitted)}
-    assert asked_of == ({"mass", "height"} if asked else set())
+    begun = told(TRUTH, NAMES, promised=chi2(TRUTH))
+    assert profile.followed(BASE, begun) is begun
+    shape = replace(WIND.parameter("y"), sized=False)  # as the height of a load
+    parameters = tuple(shape if p.name == "y" else p for p in WIND.parameters)
+    load = replace(WIND, instead=("mass",), parameters=parameters)
+    (term,) = begun.variant.terms
+    begun = replace(begun, variant=replace(begun.variant, terms=(replace(term, effect=load),)))
+    monkeypatch.setattr(profile, "_freed", lambda *_: None)
+    held = []
+    one = profile._held
+    monkeypatch.setattr(profile, "_held", lambda *a: held.append(a[2].parameter) or one(*a))
+    profile.followed(BASE, begun)
+    assert sorted(held) == ["x", "x", "y", "y"]
 
 
 def test_a_valley_that_is_flat_is_followed(stuck):

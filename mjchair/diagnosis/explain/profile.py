@@ -2,8 +2,8 @@
 
 In: a fit. Out: the fit, or a better one that was found by holding one size after the other a
 little smaller and a little larger while all else is fitted. Where the fit was stuck, or a size
-makes up for another number of its effect, or its two sides say different standard errors, each
-standard error is at least what chi2 beside it shows.
+makes up for another number of its effect or something roughly known for it, or its two sides say
+different standard errors, each standard error is at least what chi2 beside it shows.
 
 A fit is stuck where its own linear step promises clearly less than what is reached. In a fast turn
 a caster may be about to lift, and the columns of what is only roughly known are then wrong by as
@@ -41,7 +41,6 @@ AWAY = 3.0  # standard errors that a size is held beside where it was found, at 
 FARTHER = 2.0  # times that, where this led on
 MAKES_UP = 0.85  # correlation of two numbers of one effect, beyond which chi2 is asked (assumption)
 UNEVEN = 1.5  # ratio of a size's standard errors by its two sides, beyond which chi2 is asked
-MOVED = 1.0  # standard deviations of what is roughly known, beyond which chi2 is asked
 ROUNDS = 3  # of holding sizes and freeing the best
 
 
@@ -72,8 +71,9 @@ def followed(base: Base, fitted: Fitted) -> Fitted:
     if not sizes:
         return fitted
     two_sided = _two_sided(base, fitted)
-    doubtful = _make_up(fitted) | _uneven(fitted.std, two_sided) | _stood_in_for(fitted)
+    doubtful = _make_up(fitted) | _uneven(fitted.std, two_sided)
     looked = [key for key in sizes if stuck or key in doubtful]
+    looked += [key for key in _stood_in_for(fitted) if key not in looked]
     if not looked:
         return fitted
     fitted = _widened(fitted, two_sided)
@@ -114,18 +114,14 @@ def _together(fitted: Fitted, pair: frozenset[ParameterId]) -> float:
     return (a * a - b * b) / max(across, 1e-300)
 
 
-def _stood_in_for(fitted: Fitted) -> set[ParameterId]:
-    """The numbers of effects in whose place something roughly known was moved as well.
+def _stood_in_for(fitted: Fitted) -> list[ParameterId]:
+    """The numbers of effects that something roughly known stands in for.
 
     A load on the chair and the mass of the chair differ by little of each of their columns.
     """
-    offsets = fitted.variant.offsets
-    return {
-        key
-        for term in fitted.variant.terms
-        if any(abs(offsets.get(name, 0.0)) > MOVED for name in term.effect.instead)
-        for key, _ in term.parameters
-    }
+    return [
+        key for term in fitted.variant.terms if term.effect.instead for key, _ in term.parameters
+    ]
 
 
 def _two_sided(base: Base, fitted: Fitted) -> dict[ParameterId, float]:
@@ -151,10 +147,14 @@ def _wider(fitted: Fitted, key: ParameterId, std: Mapping[ParameterId, float]) -
             yield abs(r) * std[other] / fitted.std[other]
 
 
+def _numbers(fitted: Fitted) -> dict[ParameterId, Parameter]:
+    """The free parameters of a fit."""
+    return {key: p for term in fitted.variant.terms for key, p in term.parameters}
+
+
 def _sizes(fitted: Fitted) -> dict[ParameterId, Parameter]:
     """The free sizes of a fit, without those that `whole_sizes` looks at."""
-    every = (pair for term in fitted.variant.terms for pair in term.parameters)
-    return {key: p for key, p in every if p.sized and not p.whole}
+    return {key: p for key, p in _numbers(fitted).items() if p.sized and not p.whole}
 
 
 def _value(fitted: Fitted, key: ParameterId) -> float:
@@ -164,7 +164,7 @@ def _value(fitted: Fitted, key: ParameterId) -> float:
 
 def _held(base: Base, fitted: Fitted, key: ParameterId, side: float, away: float) -> Held | None:
     """The fit with a size held some standard errors away; None: no chair can be so."""
-    p = _sizes(fitted)[key]
+    p = _numbers(fitted)[key]
     size = _value(fitted, key) + side * away * fitted.std[key]
     if not p.low <= size <= p.high:
         return None
@@ -232,9 +232,9 @@ def _as_lost(wider: Fitted, fitted: Fitted, seen: Sequence[Held]) -> Fitted:
     """
     sigmas = dict(wider.sigmas)
     for held in seen:
-        neutral = _sizes(fitted)[held.key].neutral
-        less, size = held.size - neutral, _value(fitted, held.key) - neutral
-        if abs(less) >= abs(size) or less * size < 0.0:
+        p = _numbers(fitted)[held.key]
+        less, size = held.size - p.neutral, _value(fitted, held.key) - p.neutral
+        if not p.sized or abs(less) >= abs(size) or less * size < 0.0:
             continue
         lost = math.sqrt(max(held.fitted.total - fitted.total, 0.0))
         effect = held.key.effect
