@@ -39,6 +39,14 @@ def test_a_gap_that_nothing_gains_on_is_unknown():
     assert rules.verdict(True, None) == Verdict.UNKNOWN
 
 
+@pytest.mark.parametrize(("after", "two"), [(120.0, Verdict.NAMED), (350.0, Verdict.AMBIGUOUS)])
+def test_one_of_two_effects_may_stand_in_for_what_they_leave_held_out(after, two):
+    """A rider who moves beside a shimmy left 1.9 times the noise: a motor braked besides."""
+    held = HeldOut(before=1600.0, after=after, dof=100.0, changed=1500.0)
+    assert said(held_out=held) == Verdict.NAMED
+    assert said(held_out=held, sigmas=(20.0, 9.0)) == two
+
+
 @pytest.mark.parametrize(
     "reason",
     [
