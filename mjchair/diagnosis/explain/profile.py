@@ -110,7 +110,7 @@ def _together(fitted: Fitted, pair: frozenset[ParameterId]) -> float:
     if {one.parameter, other.parameter} != {"left", "right"}:
         return r
     a, b = fitted.std[one], fitted.std[other]
-    across = math.sqrt((a * a + b * b) ** 2 - (2.0 * r * a * b) ** 2)
+    across = math.sqrt(max((a * a + b * b) ** 2 - (2.0 * r * a * b) ** 2, 0.0))
     return (a * a - b * b) / max(across, 1e-300)
 
 
