@@ -23,13 +23,13 @@ import tomli_w
 from mjchair.effects import user_file
 from mjchair.effects.effect import Effect
 from mjchair.errors import MjchairError
-from mjchair.model import parts
 from mjchair.model.load import Load, strap
 from mjchair.model.parameters import ChairParameters
-from mjchair.model.spec import load_spec
+from mjchair.model.spec import compile_spec, load_spec
 from mjchair.simulation.inputs import Inputs, push_strokes
 from mjchair.simulation.recording import Recording
 from mjchair.simulation.simulate import simulate
+from mjchair.simulation.undriven import undriven
 
 SEAL = "answer.sealed"
 HELD_OUT = "push"  # no fit sees it; what is left turns in two ways and rolls in three
@@ -158,20 +158,14 @@ def hide(
 
 def _run(spec: mujoco.MjSpec, made: Manoeuvre) -> Recording:
     chair = spec.copy()
-    if made.inputs is None:
-        _switch_off(chair)
     if made.load is not None:
         strap(chair, made.load)
+    model = compile_spec(chair)
+    if made.inputs is None:  # as the diagnosis has it in such a run
+        model = undriven(model)
     return simulate(
-        chair, made.inputs, SECONDS, initial=made.initial, timestep=0.001, sample_rate=RATE
+        model, made.inputs, SECONDS, initial=made.initial, timestep=0.001, sample_rate=RATE
     )
-
-
-def _switch_off(spec: mujoco.MjSpec) -> None:
-    """Leave out what a drive does by itself, as the diagnosis does in a run that nothing drives."""
-    for wheel in parts.REAR:
-        actuator = parts.named(spec.actuators, wheel, "actuator")
-        actuator.biasprm = np.zeros_like(actuator.biasprm)
 
 
 def reveal(folder: Path) -> dict[str, object]:

@@ -22,6 +22,7 @@ from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted, refit
 from mjchair.diagnosis.fit.variant import Term
 from mjchair.effects.effect import Parameter
+from mjchair.effects.left_and_right import SIDES
 from mjchair.errors import MjchairError
 
 FURTHER = 8.0  # times the size: far beyond what a standard error may say of it
@@ -74,7 +75,7 @@ def _with_least(
 def _one_sided_sizes(term: Term) -> list[Parameter]:
     """The size of an effect that has one, or its left and its right one, if in one direction."""
     sized = [p for _, p in term.parameters if p.sized]
-    if len(sized) != 1 and {p.name for p in sized} != {"left", "right"}:
+    if len(sized) != 1 and {p.name for p in sized} != set(SIDES):
         return []
     if any(p.whole or p.neutral not in (p.low, p.high) for p in sized):
         return []

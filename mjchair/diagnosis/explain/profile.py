@@ -35,6 +35,7 @@ from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted, from_other_side
 from mjchair.diagnosis.fit.variant import Term
 from mjchair.effects.effect import Parameter, clip
+from mjchair.effects.left_and_right import SIDES
 from mjchair.errors import MjchairError
 
 AWAY = 3.0  # standard errors that a size is held beside where it was found, at first
@@ -107,7 +108,7 @@ def _together(fitted: Fitted, pair: frozenset[ParameterId]) -> float:
     left and right correlate though neither makes up for the other.
     """
     r, (one, other) = fitted.correlation[pair], pair
-    if {one.parameter, other.parameter} != {"left", "right"}:
+    if {one.parameter, other.parameter} != set(SIDES):
         return r
     a, b = fitted.std[one], fitted.std[other]
     across = math.sqrt(max((a * a + b * b) ** 2 - (2.0 * r * a * b) ** 2, 0.0))

@@ -32,6 +32,7 @@ from mjchair.model.visual_geoms import without_visual_geoms
 from mjchair.model.wheels import COMFORTABLE, check_timestep, cut_damping
 from mjchair.rider import driven_joint
 from mjchair.simulation import batch, names
+from mjchair.simulation.undriven import undriven
 
 Array = NDArray[np.float64]
 NO_BODY = ("mjMINVAL", "A + B >= C")  # MuJoCo's words for it
@@ -294,7 +295,7 @@ class WindowSimulator:
         """
         made = self.study.runs[run]
         carries = model if made.load is None else loaded(model, made.load)
-        return _coasting(made, carries)
+        return undriven(carries) if made.trial.inputs is None else carries
 
     def _as_in_their_runs(self, jobs: Sequence[Job]) -> list[Job]:
         known: dict[tuple[int, int], mujoco.MjModel] = {}
@@ -396,16 +397,3 @@ def _resized(force: Array | None, steps: int) -> Array:
     return (
         force[:steps] if len(force) >= steps else np.pad(force, ((0, steps - len(force)), (0, 0)))
     )
-
-
-def _coasting(run: Run, model: mujoco.MjModel) -> mujoco.MjModel:
-    """In a run without torque nothing is driven, so a drive's own braking is off."""
-    if run.trial.inputs is not None:
-        return model
-    known = names.actuators(model)
-    rear = [names.find(w, known, "actuator") for w in ("left_wheel", "right_wheel")]
-    if not model.actuator_biasprm[rear].any():
-        return model
-    off = copy.copy(model)
-    off.actuator_biasprm[rear] = 0.0
-    return off
