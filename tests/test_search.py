@@ -136,8 +136,9 @@ def reduced(total):
 
 
 def searching():
+    windows = [SimpleNamespace(run=k // 2, shimmies=False) for k in range(4)]
     base = SimpleNamespace(
-        bench=SimpleNamespace(simulator=SimpleNamespace(windows=[]), windows=np.arange(4)),
+        bench=SimpleNamespace(simulator=SimpleNamespace(windows=windows), windows=np.arange(4)),
         nuisances={},
         plain=SimpleNamespace(total=2000.0, variant=Variant(()), chi2=np.full(4, 500.0)),
         reduced=reduced(2000.0),
@@ -993,6 +994,27 @@ def test_one_window_neither_rules_a_rival_out_nor_keeps_it(worse, stays):
     assert rivals._not_ruled_out(rival, chosen, 12_000.0) == stays
 
 
+@pytest.mark.parametrize(
+    ("theirs", "stays"),
+    [
+        ([500.0, 500.0, 100.0, 100.0], True),  # no better than nothing in a run
+        ([500.0, 900.0, 100.0, 100.0], False),  # worse than nothing there
+        ([900.0, 100.0, 100.0, 100.0], True),  # in one of its windows, and better in the other
+    ],
+)
+def test_a_rival_that_fits_a_run_worse_than_nothing_does_is_out(theirs, stays):
+    """Toe as large as a coast asked for fitted a spin worse than no effect at all."""
+
+    def one(start, chi2):
+        fitted = SimpleNamespace(confined=0.0, total=sum(chi2), chi2=np.array(chi2), at_bound=())
+        return Tried(Hypothesis((start,), gain=9000.0, score=8990.0), fitted)
+
+    base = searching().base
+    chosen, rival = one(ROLLING, [100.0] * 4), one(MOTOR, theirs)
+    harm = rivals._harm(base, rival.fitted, chosen.fitted)
+    assert rivals._not_ruled_out(rival, chosen, 9000.0, harm) == stays
+
+
 def test_where_no_second_effect_stands_no_third_is_tried(fits, monkeypatch):
     """The second effect is not determined."""
     third = Hypothesis((ROLLING, MOTOR, effect("scrub")), gain=950.0, score=920.0)
@@ -1054,11 +1076,11 @@ def test_a_rival_of_one_effect_is_weighed_against_what_that_effect_brings(
     )
     looking.near_to = lambda tried: mock.patch.object(looking, "near", looking)
     near = {}
-    of_all = np.resize([4.0, -4.0], 20)
+    of_all = np.resize([4.0, -4.0], 4)
     bare = {"at_bound": (), "variant": Variant(())}
-    ours = SimpleNamespace(confined=0.0, total=1_000.0, chi2=np.full(20, 50.0), **bare)
+    ours = SimpleNamespace(confined=0.0, total=1_000.0, chi2=np.full(4, 250.0), **bare)
     theirs = SimpleNamespace(
-        confined=0.0, total=1_000.0 + worse, chi2=50.0 + worse / 20.0 + of_all, **bare
+        confined=0.0, total=1_000.0 + worse, chi2=250.0 + worse / 4.0 + of_all, **bare
     )
     both = Hypothesis((ROLLING, MOTOR), gain=64_000.0, score=63_990.0)
 
@@ -1095,7 +1117,7 @@ def test_the_best_replacement_of_a_lone_effect_is_fitted(overstated, monkeypatch
         return [other]
 
     monkeypatch.setattr(rivals, "with_one_more", with_one_more)
-    fit = {"at_bound": (), "variant": Variant(()), "chi2": np.full(20, 50.0)}
+    fit = {"at_bound": (), "variant": Variant(()), "chi2": np.full(4, 250.0)}
     looking.fit = lambda hypothesis, best=None: Tried(
         hypothesis, SimpleNamespace(confined=0.0, total=995.0, **fit)
     )

@@ -689,7 +689,9 @@ def is_shown(probability: float, before: float = 1.0) -> bool:
     return probability >= SHOWN or (probability >= LISTED and before < PROBABLE)
 
 
-def stays_a_rival(*, behind: float, gain: float, errors: float, beyond_bound: bool) -> bool:
+def stays_a_rival(
+    *, behind: float, gain: float, errors: float, beyond_bound: bool, harm: float = 0.0
+) -> bool:
     """Whether a fitted rival is not ruled out.
 
     Args:
@@ -697,9 +699,12 @@ def stays_a_rival(*, behind: float, gain: float, errors: float, beyond_bound: bo
       errors: `behind` in paired standard errors over windows; they speak for no rival that misses
         most of what the chosen brings. beyond_bound: it alone would have to be larger than it can
         be.
+      harm: chi2 by which it fits runs worse than nothing does which the chosen fits. Something odd
+        in a few windows makes a rival no better than nothing there, and none worse.
     """
-    near = behind < not_ruled_out(gain=gain)
-    scattered = errors < RIVAL_ERRORS and behind < REPLACES * gain
+    form = not_ruled_out(gain=gain)
+    near = behind < form
+    scattered = errors < RIVAL_ERRORS and behind < REPLACES * gain and harm < form
     return not beyond_bound and (near or scattered)
 
 
