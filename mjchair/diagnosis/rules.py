@@ -726,10 +726,13 @@ def to_show_again(*, event: float, gain: float) -> float:
     return max(event / CARRIES - gain, RIVAL_CHI2)
 
 
-def paired_errors(theirs: Array, ours: Array) -> float:
-    """By how many standard errors, over windows, `theirs` is worse; chi2 of each, (windows,)."""
-    difference = theirs - ours
+def paired_errors(behind: float, difference: Array) -> float:
+    """By how many standard errors, over windows, a rival is worse (Vuong 1989, the corrected ratio).
+
+    Args:
+      behind: chi2 with penalties by which it is. difference: of chi2, in each window, (windows,).
+    """
     if difference.size < 2:
-        return float(difference.sum())
+        return behind
     spread = float(difference.std(ddof=1)) * math.sqrt(difference.size)
-    return float(difference.sum() / max(spread, 1e-9))
+    return behind / max(spread, 1e-9)

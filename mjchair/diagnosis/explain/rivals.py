@@ -253,20 +253,17 @@ def _not_ruled_out(rival: Tried, chosen: Tried, brought: float, harm: float = 0.
     It is also out where all windows but the one that tells most against it rule it out: that one
     makes the scatter over windows so large that it hides what the others say.
     """
-    theirs, ours = rival.fitted.chi2, chosen.fitted.chi2
+    difference = rival.fitted.chi2 - chosen.fitted.chi2
     behind = rival.price - chosen.price
-    most = int(np.argmax(theirs - ours))
-    cases = (
-        (behind, theirs, ours),
-        (behind - (theirs - ours)[most], np.delete(theirs, most), np.delete(ours, most)),
-    )
+    most = int(np.argmax(difference))
+    cases = ((behind, difference), (behind - difference[most], np.delete(difference, most)))
     return all(
         rules.stays_a_rival(
             behind=by,
             gain=brought,
-            errors=rules.paired_errors(other, own),
+            errors=rules.paired_errors(by, left),
             harm=harm,
             beyond_bound=bool(rival.fitted.at_bound and not chosen.fitted.at_bound),
         )
-        for by, other, own in cases
+        for by, left in cases
     )
