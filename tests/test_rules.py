@@ -477,6 +477,19 @@ def test_what_is_probable_is_shown_as_a_rival():
     assert not rules.is_shown(0.01, before=0.94)
 
 
+@pytest.mark.parametrize(
+    ("linear", "fitted", "brings"),
+    [
+        (1000.0, 1300.0, 1000.0),  # a patch finds its place
+        (-1247.0, 2059.0, 2059.0),  # casters turn over, which linear algebra does not see
+        (400.0, 900.0, 900.0),
+    ],
+)
+def test_an_event_is_held_against_what_its_own_algebra_says_of_effects(linear, fitted, brings):
+    """An event of 122 stood beside a trail and a friction that bring 2059."""
+    assert rules.beside_event(linear=linear, fitted=fitted) == brings
+
+
 def test_what_was_moved_far_is_measured_to_either_side():
     assert rules.is_far(-2.6)
     assert rules.is_far(2.5)

@@ -239,7 +239,13 @@ def _standing_keys(choice: Choice) -> set[str]:
 def _once(base: Base, choice: Choice, held: rules.HeldOut | None) -> bool:
     """Whether something that happened once, in one run, fits about as well as the effects do."""
     largest = event.largest(base).gain
-    return rules.happened_once(event=largest, gain=choice.hypothesis.gain, held=held)
+    return rules.happened_once(event=largest, gain=_beside_event(base, choice), held=held)
+
+
+def _beside_event(base: Base, choice: Choice) -> float:
+    """Chi2 that the effects bring, as it is held against what an event does."""
+    fitted = gain(base, choice.fitted)
+    return rules.beside_event(linear=choice.hypothesis.gain, fitted=fitted)
 
 
 def _process(base: Base) -> dict[str, Estimate]:
@@ -293,7 +299,7 @@ def _plan(base: Base, choice: Choice, once: bool) -> tuple[Plan | None, list[str
     if once:
         near.append(base.plain)
         needed.append(
-            rules.to_show_again(event=event.largest(base).gain, gain=choice.hypothesis.gain)
+            rules.to_show_again(event=event.largest(base).gain, gain=_beside_event(base, choice))
         )
     try:
         plan = design.plan(base.bench, chosen, near, needed=needed)

@@ -420,6 +420,19 @@ def happened_once(*, event: float, gain: float, held: HeldOut | None = None) -> 
     return event > CARRIES * gain and not (held is not None and shows_again(held))
 
 
+def beside_event(*, linear: float, fitted: float) -> float:
+    """Chi2 that effects bring, as it is held against what an event does.
+
+    Linear algebra tells what an event brings, and so it does for effects: a patch that is fitted
+    finds its place, and an event its second only. Where it sees less than half of what the effects
+    bring, as of casters that turn over, their fit tells.
+
+    Args:
+      linear, fitted: chi2 that they bring by linear algebra, and by their fit.
+    """
+    return linear if linear > REPLACES * fitted else fitted
+
+
 def believable(*, std: float, change: float, width: float) -> bool:
     """Whether a standard error tells more than bounds and typical sizes do.
 
