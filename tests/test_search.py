@@ -136,13 +136,12 @@ def reduced(total):
 
 
 def searching():
-    windows = [SimpleNamespace(run=k // 2, shimmies=False) for k in range(4)]
     base = SimpleNamespace(
-        bench=SimpleNamespace(simulator=SimpleNamespace(windows=windows), windows=np.arange(4)),
+        bench=SimpleNamespace(simulator=SimpleNamespace(windows=[]), windows=np.arange(4)),
         nuisances={},
         plain=SimpleNamespace(total=2000.0, variant=Variant(()), chi2=np.full(4, 500.0)),
         reduced=reduced(2000.0),
-        system=SimpleNamespace(places={}),
+        system=SimpleNamespace(places={}, run=np.arange(4) // 2),
         around=SimpleNamespace(track="as given", variant=Variant(())),
         found=None,
         best=None,
@@ -985,11 +984,12 @@ def test_one_window_neither_rules_a_rival_out_nor_keeps_it(worse, stays):
     scatter = np.resize([4.0, -4.0], len(worse))
     ours = np.full(len(worse), 100.0)
     total = ours.sum()
-    chosen = Tried(ONE, SimpleNamespace(confined=0.0, total=total, chi2=ours, at_bound=()))
+    bare = {"at_bound": (), "variant": Variant(())}
+    chosen = Tried(ONE, SimpleNamespace(confined=0.0, total=total, chi2=ours, **bare))
     theirs = ours + np.array(worse) + scatter
     rival = Tried(
         Hypothesis((MOTOR,), 400.0, 390.0),
-        SimpleNamespace(confined=0.0, total=theirs.sum(), chi2=theirs, at_bound=()),
+        SimpleNamespace(confined=0.0, total=theirs.sum(), chi2=theirs, **bare),
     )
     assert rivals._not_ruled_out(rival, chosen, 12_000.0) == stays
 
@@ -1005,14 +1005,45 @@ def test_one_window_neither_rules_a_rival_out_nor_keeps_it(worse, stays):
 def test_a_rival_that_fits_a_run_worse_than_nothing_does_is_out(theirs, stays):
     """Toe as large as a coast asked for fitted a spin worse than no effect at all."""
 
-    def one(start, chi2):
-        fitted = SimpleNamespace(confined=0.0, total=sum(chi2), chi2=np.array(chi2), at_bound=())
-        return Tried(Hypothesis((start,), gain=9000.0, score=8990.0), fitted)
-
     base = searching().base
-    chosen, rival = one(ROLLING, [100.0] * 4), one(MOTOR, theirs)
+    chosen, rival = _single(ROLLING, [100.0] * 4), _single(MOTOR, theirs)
     harm = rivals._harm(base, rival.fitted, chosen.fitted)
     assert rivals._not_ruled_out(rival, chosen, 9000.0, harm) == stays
+
+
+def _single(start, chi2, **offsets):
+    """A fit of one effect, with roughly known numbers moved by standard deviations."""
+    variant = Variant((), offsets=offsets)
+    fitted = SimpleNamespace(
+        confined=0.0, total=sum(chi2), chi2=np.array(chi2), at_bound=(), variant=variant
+    )
+    return Tried(Hypothesis((start,), gain=900.0, score=890.0), fitted)
+
+
+@pytest.mark.parametrize(
+    ("behind", "theirs", "ours", "stays"),
+    [
+        (19.0, 2.9, 0.0, True),
+        (19.0, 3.0, 0.0, False),
+        (19.0, -3.0, 3.0, True),  # what pushes it is missing beside both
+        (9.0, 3.0, 0.0, True),  # it fits as well as forms are right
+    ],
+)
+def test_a_rival_with_a_number_on_its_wall_lacks_what_pushes_it_there(behind, theirs, ours, stays):
+    """A turning scrub with the centre of mass at its wall stood beside one that is aside."""
+    chosen = _single(ROLLING, [100.0] * 4, centre_x=ours)
+    rival = _single(MOTOR, [100.0 + behind, 100.0, 100.0, 100.0], centre_x=theirs)
+    wind = _single(WIND, [100.0 + behind, 100.0, 100.0, 100.0], centre_x=theirs)
+    assert rivals._not_ruled_out(rival, chosen, 320.0) == stays
+    choice = chosen_by([chosen, wind])
+    found = rivals.with_probable(choice, {"rolling": 0.8, "wind": 0.2})
+    assert [len(group) for group in found.rivals] == [int(stays)]
+
+
+def chosen_by(tried):
+    """A choice of the first of what was tried, which brings 320."""
+    first = tried[0]
+    return replace(chosen(first.hypothesis, [], [320.0]), fitted=first.fitted, tried=tried)
 
 
 def test_where_no_second_effect_stands_no_third_is_tried(fits, monkeypatch):

@@ -740,7 +740,9 @@ def to_show_again(*, event: float, gain: float) -> float:
 
 
 def paired_errors(behind: float, difference: Array) -> float:
-    """By how many standard errors, over windows, a rival is worse (Vuong 1989, the corrected ratio).
+    """By how many standard errors, over windows, a rival is worse: Vuong's corrected ratio.
+
+    Vuong, "Likelihood ratio tests for model selection and non-nested hypotheses", 1989.
 
     Args:
       behind: chi2 with penalties by which it is. difference: of chi2, in each window, (windows,).

@@ -23,6 +23,8 @@ from mjchair.diagnosis.explain.left_out import speaks_against
 from mjchair.diagnosis.explain.probability import shown
 from mjchair.diagnosis.explain.screening import Base, gain, overstated
 from mjchair.diagnosis.explain.shortlist import with_one_more
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.nonlinear import Fitted
 
 REFITTED = 5  # rivals of an effect that is alone
 BESIDE = 3  # rivals of each effect that has others beside it
@@ -183,7 +185,13 @@ def with_probable(choice: Choice, probability: Mapping[str, float]) -> Choice:
     """
     chosen = choice.hypothesis
     worth = shown(probability, chosen.name)
-    likely = [t for t in choice.tried if t.hypothesis.name in worth and is_there(t.fitted)]
+    likely = [
+        t
+        for t in choice.tried
+        if t.hypothesis.name in worth
+        and is_there(t.fitted)
+        and not _is_pushed(t, Tried(chosen, choice.fitted), choice.brought_beyond(t.hypothesis))
+    ]
     out = []
     for start, rivals in zip(chosen.starts, choice.rivals, strict=True):
         known = [r.hypothesis.keys for r in rivals]
@@ -231,13 +239,27 @@ def exchanged(choice: Choice) -> list[tuple[list[Start], list[Start], Tried]]:
     ]
 
 
+def _is_pushed(rival: Tried, chosen: Tried, brought: float) -> bool:
+    """Whether a rival fits worse, with a number on its wall that the chosen effects leave off it.
+
+    What is only roughly known stands there where something else is missing: a turning scrub with
+    the centre of mass at its wall stood beside a centre of mass aside, and so did nothing at all.
+
+    Args:
+      brought: chi2, by the effect in whose place the rival would stand.
+    """
+    theirs, ours = (set(bounded.at_walls(t.fitted.variant.offsets)) for t in (rival, chosen))
+    behind = rival.price - chosen.price
+    return bool(theirs - ours) and behind >= rules.not_ruled_out(gain=brought)
+
+
 def _harm(base: Base, rival: Fitted, chosen: Fitted) -> float:
     """Chi2 by which a rival fits runs worse than nothing does which the chosen effects fit.
 
     A toe as large as the deceleration of a coast asked for left a spin with 4470, which nothing
     leaves with 2920 and the rolling resistance that was there with 820.
     """
-    label = [base.bench.simulator.windows[int(i)].run for i in base.bench.windows]
+    label = base.system.run[base.bench.windows]
     nothing, theirs, ours = (np.bincount(label, f.chi2) for f in (base.plain, rival, chosen))
     return float(np.maximum(theirs - np.maximum(nothing, ours), 0.0).sum())
 
@@ -253,6 +275,8 @@ def _not_ruled_out(rival: Tried, chosen: Tried, brought: float, harm: float = 0.
     It is also out where all windows but the one that tells most against it rule it out: that one
     makes the scatter over windows so large that it hides what the others say.
     """
+    if _is_pushed(rival, chosen, brought):
+        return False
     difference = rival.fitted.chi2 - chosen.fitted.chi2
     behind = rival.price - chosen.price
     most = int(np.argmax(difference))
