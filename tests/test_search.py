@@ -936,13 +936,40 @@ def test_an_effect_of_a_whole_size_may_be_better_than_several(fits, monkeypatch,
     looking.tried.append(Tried(ONE, fit(1700.0, "rolling")))
     alternatives.or_whole_beside(looking, (several, closed))
     assert [single for single, _ in looked] == [2000.0, min(1700.0, total)]
-    # one effect that leaves nothing is not doubted, nor one of a whole size
+    # one effect that leaves nothing is not doubted
     one = (Tried(ONE, fit(1500.0, "rolling")), closed)
     assert alternatives.or_whole_beside(looking, one) is one
-    parameter = SimpleNamespace(whole=(1.0,))
-    monkeypatch.setattr(whole_sizes, "parameter_of", lambda _: parameter)
-    assert alternatives.or_whole_beside(looking, (several, closed))[0] is several
     assert len(looked) == 2
+
+
+@pytest.mark.parametrize("shimmies", [False, True])
+def test_beside_what_makes_casters_shimmy_another_effect_is_sought(fits, monkeypatch, shimmies):
+    """A rider who moves stood in for a motor's back EMF."""
+    monkeypatch.setattr(
+        whole_sizes, "parameter_of", lambda e: "whole" if e.key == "rolling" else None
+    )
+    monkeypatch.setattr(whole_sizes, "shimmies", lambda _: shimmies)
+    brake = effect("brake")
+    better, looked = fit(1200.0, "rolling", "brake"), []
+
+    def made(base, single):
+        looked.append(single.total)
+        return [((ROLLING, brake), better)]
+
+    monkeypatch.setattr(whole_beside, "beside_shimmy", made)
+    monkeypatch.setattr(hypotheses, "weigh", lambda *_: Hypothesis((ROLLING, brake), 9.0, 9.0))
+    believe(monkeypatch, lambda _: True)
+    monkeypatch.setattr(fits_of_hypotheses, "gap_after", lambda *_: SimpleNamespace(exists=False))
+    looking = searching()
+    looking.tried += [
+        Tried(ONE, fit(1700.0, "rolling")),
+        Tried(BOTH, fit(1500.0, "rolling", "motor")),
+    ]
+    looking.tried.append(Tried(Hypothesis((WIND,), 9.0, 9.0), fit(1600.0, "wind")))
+    here = (looking.tried[1], SimpleNamespace(exists=False))
+    found = alternatives.or_whole_beside(looking, here)
+    assert found[0].fitted is (better if shimmies else here[0].fitted)
+    assert looked == ([1700.0] if shimmies else [])
 
 
 def test_a_fit_that_cannot_come_near_the_best_is_not_started_again(fits):

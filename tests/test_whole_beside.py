@@ -6,6 +6,7 @@ sizes fit worse than none. In: what windows show at each size. Out: where fits b
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import linear_system
@@ -14,7 +15,8 @@ import pytest
 from linear_system import start
 
 from mjchair.diagnosis.explain import whole_beside, whole_sizes
-from mjchair.diagnosis.fit.variant import Variant
+from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.diagnosis.replay.window_states import Track
 
 MOMENT, ROLLING = 4.3, 0.004  # N m, 1
 COLUMNS = np.linalg.qr(np.random.default_rng(3).standard_normal((40, 3)))[0]
@@ -51,6 +53,39 @@ def base(monkeypatch):
         columns=dict.fromkeys([*RESISTANCE.columns, *SCRUB.columns]),
         starts=[RESISTANCE, SCRUB],
     )
+
+
+def test_beside_a_shimmy_calm_windows_tell_the_other_effect(monkeypatch):
+    """In the first window, which shimmies, more of a drag stands for what is left of the swing."""
+    brake, drag, shimmy = start("back_emf"), start("air_drag"), start("relaxation_length")
+    columns = [*shimmy.columns, *brake.columns, *drag.columns]
+    J = 10.0 * COLUMNS
+    shown = np.array([[3.0, 0.0, 9.0], [0.0, 2.0, 0.0]])  # of each column in each window
+    both = [linear_system.system(columns, J, J @ of) for of in shown]
+    system = replace(
+        both[0],
+        **{
+            name: np.concatenate([getattr(s, name) for s in both])
+            for name in ("G", "b", "c", "run")
+        },
+    )
+    windows = [SimpleNamespace(shimmies=True), SimpleNamespace(shimmies=False)]
+    base = SimpleNamespace(
+        bench=SimpleNamespace(windows=np.arange(2), simulator=SimpleNamespace(windows=windows)),
+        system=system,
+        starts=[shimmy, drag, brake],
+    )
+    term = Term(shimmy.effect, {"length": 0.096}, ("length",))
+    track = Track([], [], [], [])
+    single = SimpleNamespace(variant=Variant((), offsets={"mass": 2.3}, terms=(term,)), track=track)
+    monkeypatch.setattr(whole_beside, "made_anew", lambda _, begin, before: (begin, before))
+    ((starts, (begin, before)),) = whole_beside.beside_shimmy(base, single)
+    assert starts == (shimmy, brake)
+    assert begin.terms[0] is term
+    coefficient = begin.terms[1].values["coefficient"]
+    assert coefficient == pytest.approx(2.0 * brake.effect.fitted[0].change, rel=1e-4)
+    assert not begin.offsets  # the mass had taken the brake
+    assert before.touchy == {0}
 
 
 def begun(base, monkeypatch, best):

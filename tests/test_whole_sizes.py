@@ -89,11 +89,11 @@ def test_a_fit_from_a_size_ends_where_it_falls_too_far_behind(monkeypatch, besid
     reaches = []
     seen = Seen(500.0, Variant(()))
 
-    def refit(bench, begin, track, reach):
+    def made_anew(bench, begin, track, reach):
         reaches.append(reach)
         return "the fit"
 
-    monkeypatch.setattr(whole_sizes, "refit", refit)
+    monkeypatch.setattr(whole_sizes, "made_anew", made_anew)
     monkeypatch.setattr(whole_sizes, "chi2", lambda *_: 2000.0)
     monkeypatch.setattr(whole_sizes, "best_sizes", lambda *_: [seen])
     monkeypatch.setattr(whole_beside, "_with_best", lambda *_: seen)
@@ -242,11 +242,11 @@ def test_a_size_is_known_no_better_than_fits_that_began_beside_it_say(monkeypatc
     chosen = ended(0.100, 3020.0)
     begun_at = []
 
-    def refit(bench, begin, track, reach):
+    def made_anew(bench, begin, track):
         begun_at.append(begin.terms[0].values["length"])
         return ended(*ends[len(begun_at) - 1])
 
-    monkeypatch.setattr(whole_sizes, "refit", refit)
+    monkeypatch.setattr(whole_sizes, "made_anew", made_anew)
     base = SimpleNamespace(bench=None, plain=SimpleNamespace(total=13_000.0))
     found = whole_sizes.compared(base, chosen)
     assert begun_at == pytest.approx([0.09, 0.11])
@@ -256,7 +256,7 @@ def test_a_size_is_known_no_better_than_fits_that_began_beside_it_say(monkeypatc
 
 
 def test_fits_without_whole_sizes_are_not_made_again(monkeypatch):
-    monkeypatch.setattr(whole_sizes, "refit", None)
+    monkeypatch.setattr(whole_sizes, "made_anew", None)
     term = Term(find("toe"), {"symmetric": 0.01, "asymmetric": 0.0}, ("symmetric",))
     one = replace(ended(0.1, 10.0), variant=Variant((), terms=(term,)))
     found = whole_sizes.compared(SimpleNamespace(plain=SimpleNamespace(total=90.0)), one)

@@ -7,7 +7,7 @@ or of a whole size, alone or beside one other.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from operator import attrgetter
 
@@ -128,15 +128,36 @@ def or_whole_beside(fits: Fits, here: WithGap) -> WithGap:
     These are tried where it takes several effects, or one leaves a gap. What small changes lead to
     may then stand in for both: a centre of mass, a drive and a rolling resistance for bearings that
     rub and tires that resist turning, and a drive with a rider who sways for these tires alone.
+    Beside one that is in already, and makes casters shimmy, another may stand in for the right one.
     """
     best = here[0]
     starts = best.hypothesis.starts
-    several = len(starts) > 1 or here[1].exists
-    if not several or any(whole_sizes.parameter_of(s.effect) is not None for s in starts):
+    if len(starts) == 1 and not here[1].exists:
         return here
-    singles = [t.fitted for t in fits.tried if len(t.hypothesis.starts) == 1]
-    single = min(singles, key=attrgetter("total"), default=fits.base.plain)
+    whole = {s.effect.key for s in starts if whole_sizes.parameter_of(s.effect) is not None}
+    if whole:
+        return _or_beside_shimmy(fits, here, whole)
+    single = _best_single(fits) or fits.base.plain
     return _or_made(fits, here, whole_beside.fits(fits.base, single, fits.anew(best)))
+
+
+def _or_beside_shimmy(fits: Fits, here: WithGap, whole: Collection[str]) -> WithGap:
+    """The effects, or a better one beside what makes casters shimmy, if any do.
+
+    Args:
+      whole: effects of a whole size that are in.
+    """
+    single = _best_single(fits, whole)
+    if single is None or not whole_sizes.shimmies(fits.base):
+        return here
+    return _or_made(fits, here, whole_beside.beside_shimmy(fits.base, single))
+
+
+def _best_single(fits: Fits, keys: Collection[str] = ()) -> Fitted | None:
+    """The best fit of a single effect, of these keys if there are any; None: none was made."""
+    singles = [t for t in fits.tried if len(t.hypothesis.starts) == 1]
+    some = [t.fitted for t in singles if not keys or t.hypothesis.keys[0] in keys]
+    return min(some, key=attrgetter("total"), default=None)
 
 
 def _or_made(

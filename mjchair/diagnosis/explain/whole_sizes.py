@@ -23,10 +23,11 @@ from mjchair.diagnosis import rules
 from mjchair.diagnosis.data.shimmy import CASTERS
 from mjchair.diagnosis.data.windows import shimmying
 from mjchair.diagnosis.explain.candidates import Start
+from mjchair.diagnosis.explain.multistart import made_anew
 from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import ParameterId
-from mjchair.diagnosis.fit.nonlinear import Fitted, refit
+from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.replay.window_states import Track, track
 from mjchair.effects.effect import Effect, Parameter
@@ -138,15 +139,8 @@ def fit_from(base: Base, begin: Variant, windows: Sequence[int], reach: float) -
       windows: in which it slides or shimmies: there coarse derivatives lead a fit astray.
       reach: chi2; a fit that promises more after a round ends there.
     """
-    return _refitted(base, begin, replace(base.around.track, touchy=frozenset(windows)), reach)
-
-
-def _refitted(base: Base, begin: Variant, before: Track, reach: float = np.inf) -> Fitted | None:
-    """The fit that begins at a chair and a track; None: this chair cannot have it."""
-    try:
-        return refit(base.bench, begin, before, reach=reach)
-    except (MjchairError, np.linalg.LinAlgError):
-        return None
+    before = replace(base.around.track, touchy=frozenset(windows))
+    return made_anew(base.bench, begin, before, reach=reach)
 
 
 def compared(base: Base, fitted: Fitted) -> Fitted:
@@ -179,7 +173,7 @@ def _beside(base: Base, fitted: Fitted) -> Iterator[Fitted]:
         for share in (1.0 - BESIDE, 1.0 + BESIDE):
             moved = replace(term, values={**term.values, p.name: share * term.values[p.name]})
             begin = replace(fitted.variant, terms=(*terms[:k], moved, *terms[k + 1 :]))
-            made = _refitted(base, begin, fitted.track)
+            made = made_anew(base.bench, begin, fitted.track)
             if made is not None:
                 yield made
 
