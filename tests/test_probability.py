@@ -13,6 +13,7 @@ from linear_system import start
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import calibration, hypotheses, probability
 from mjchair.diagnosis.explain.calibration import Chosen, Weight
+from mjchair.diagnosis.explain.choice import Choice, Tried
 from mjchair.diagnosis.explain.column_ids import (
     Driver,
     ForceColumn,
@@ -54,14 +55,15 @@ def fit(known, *effects):
         sigmas={s.effect.name: math.sqrt(max(hypothesis.gain, 0.0)) for s in effects},
         variant=Variant(()),
     )
-    return SimpleNamespace(hypothesis=hypothesis, fitted=fitted)
+    return Tried(hypothesis, fitted)
 
 
 def chosen(known, name, rivals=(), gap_left=False):
     """The choice of one effect; every effect was fitted."""
     fits = {s.effect.name: fit(known, s) for s in known.starts}
-    return SimpleNamespace(
-        **vars(fits[name]),
+    return Choice(
+        hypothesis=fits[name].hypothesis,
+        fitted=fits[name].fitted,
         tried=list(fits.values()),
         after=SimpleNamespace(exists=gap_left),
         rivals=[[fits[r] for r in rivals]],
@@ -99,7 +101,7 @@ def test_a_choice_counts_though_another_fit_of_it_ended_where_it_is_not_there(fi
     """A pair was fitted twice, once to where its wind was still: there was no probability of it."""
     made = base(2.0)
     choice = chosen(made, "rolling_resistance")
-    still = SimpleNamespace(**vars(fit(made, made.starts[0])))
+    still = fit(made, made.starts[0])
     still.fitted.total = made.plain.total - 1.0
     choice.tried.insert(0 if first else len(choice.tried), still)
     sure = probabilities(made, chosen(made, "rolling_resistance"))
@@ -128,6 +130,29 @@ def test_a_hypothesis_whose_only_fit_ended_where_it_is_not_there_has_no_part(mon
     assert "rolling_resistance" in probability.weights(made, choice)
 
 
+@pytest.mark.parametrize(("rival", "part"), [("caster_trail", False), ("rolling_resistance", True)])
+def test_a_rival_that_pushes_a_number_to_its_wall_has_no_part(rival, part):
+    """A turning scrub with the centre of mass at its wall took 6 % from a centre of mass aside.
+
+    What some of the chosen effects leave without the others still tells what these bring.
+    """
+    made = base(2.0, alike=0.9)
+    both = fit(made, *made.starts[:2]) if part else fit(made, made.starts[0])
+    choice = Choice(
+        hypothesis=both.hypothesis,
+        fitted=both.fitted,
+        tried=[both, *(fit(made, s) for s in made.starts)],
+        after=SimpleNamespace(exists=False),
+        rivals=[],
+        own_gains=[both.hypothesis.gain] * len(both.hypothesis.starts),
+    )
+    assert rival in probability.weights(made, choice)
+    pushed = next(t for t in choice.tried[1:] if t.hypothesis.name == rival)
+    pushed.fitted.variant = Variant((), offsets={"centre_x": 3.0})
+    pushed.fitted.total += 50.0
+    assert (rival in probability.weights(made, choice)) == part
+
+
 def test_what_was_fitted_beside_a_choice_takes_part_though_linear_algebra_did_not_ask_for_it(
     monkeypatch,
 ):
@@ -138,6 +163,7 @@ def test_what_was_fitted_beside_a_choice_takes_part_though_linear_algebra_did_no
     choice = chosen(made, "rolling_resistance", ["caster_trail"])
     fits = [fit(made, one, other), fit(made, alike, other)]
     choice.hypothesis, choice.fitted, choice.tried = fits[0].hypothesis, fits[0].fitted, fits
+    choice.own_gains = [200.0, 200.0]
     known = probability.weights(made, choice)
     assert known["caster_friction+caster_trail"].fitted
     of_rival = known["caster_friction+caster_trail"].evidence

@@ -12,6 +12,7 @@ from mjchair.diagnosis.explain.column_ids import EffectGroup, ForceGroup
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.screening import Base, gain
+from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.nonlinear import Fitted
 
 FURTHER = 3.5  # sigmas of a test whose statistic may count as left
@@ -75,6 +76,20 @@ def is_there(fitted: Fitted) -> bool:
     """
     shaped = [t for t in fitted.variant.terms if any(not p.sized for _, p in t.parameters)]
     return all(rules.is_there(sigmas=fitted.sigmas[t.effect.key]) for t in shaped)
+
+
+def is_pushed(rival: Tried, chosen: Tried, brought: float) -> bool:
+    """Whether a rival fits worse, with a number on its wall that the chosen effects leave off it.
+
+    What is only roughly known stands there where something else is missing: a turning scrub with
+    the centre of mass at its wall stood beside a centre of mass aside, and so did nothing at all.
+
+    Args:
+      brought: chi2, by the effect in whose place the rival would stand.
+    """
+    theirs, ours = (set(bounded.at_walls(t.fitted.variant.offsets)) for t in (rival, chosen))
+    behind = rival.price - chosen.price
+    return bool(theirs - ours) and behind >= rules.not_ruled_out(gain=brought)
 
 
 def closure(gap: Gap, base: Base, fitted: Fitted, after: Gap) -> float:

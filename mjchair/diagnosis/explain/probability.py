@@ -20,7 +20,7 @@ from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import calibration, hypotheses
 from mjchair.diagnosis.explain.calibration import NONE, OUTSIDE, Chosen, Weight
 from mjchair.diagnosis.explain.candidates import Start
-from mjchair.diagnosis.explain.choice import Choice, is_there
+from mjchair.diagnosis.explain.choice import Choice, Tried, is_pushed, is_there
 from mjchair.diagnosis.explain.column_ids import ForceGroup
 from mjchair.diagnosis.explain.gap import groups
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
@@ -176,12 +176,21 @@ def _kept(base: Base, choice: Choice | None) -> dict[str, float]:
 def _absent(choice: Choice | None) -> set[str]:
     """The hypotheses whose fits all end where an effect of theirs is not there; never the choice.
 
-    A pair may be fitted twice, and end once where its wind is still.
+    A pair may be fitted twice, and end once where its wind is still. Nor is that an explanation
+    which pushes a number to its wall; but that some of the chosen effects do tells what the others
+    bring.
     """
     if choice is None:
         return set()
-    there = {t.hypothesis.name for t in choice.tried if is_there(t.fitted)}
-    return {t.hypothesis.name for t in choice.tried} - there - {choice.hypothesis.name}
+    chosen = Tried(choice.hypothesis, choice.fitted)
+
+    def stands(t: Tried) -> bool:
+        fewer = set(t.hypothesis.keys) < set(chosen.hypothesis.keys)
+        pushed = is_pushed(t, chosen, choice.brought_beyond(t.hypothesis))
+        return is_there(t.fitted) and (fewer or not pushed)
+
+    there = {t.hypothesis.name for t in choice.tried if stands(t)}
+    return {t.hypothesis.name for t in choice.tried} - there - {chosen.hypothesis.name}
 
 
 def _evidence(reduced: Reduced, h: Hypothesis, gained: float, starts: Sequence[Start]) -> float:

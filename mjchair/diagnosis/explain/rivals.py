@@ -16,14 +16,13 @@ import numpy as np
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain.backward_elimination import without_needless
 from mjchair.diagnosis.explain.candidates import Start
-from mjchair.diagnosis.explain.choice import Choice, Tried, is_there
+from mjchair.diagnosis.explain.choice import Choice, Tried, is_pushed, is_there
 from mjchair.diagnosis.explain.fits import Fits, believable
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.left_out import speaks_against
 from mjchair.diagnosis.explain.probability import shown
 from mjchair.diagnosis.explain.screening import Base, gain, overstated
 from mjchair.diagnosis.explain.shortlist import with_one_more
-from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.nonlinear import Fitted
 
 REFITTED = 5  # rivals of an effect that is alone
@@ -190,7 +189,7 @@ def with_probable(choice: Choice, probability: Mapping[str, float]) -> Choice:
         for t in choice.tried
         if t.hypothesis.name in worth
         and is_there(t.fitted)
-        and not _is_pushed(t, Tried(chosen, choice.fitted), choice.brought_beyond(t.hypothesis))
+        and not is_pushed(t, Tried(chosen, choice.fitted), choice.brought_beyond(t.hypothesis))
     ]
     out = []
     for start, rivals in zip(chosen.starts, choice.rivals, strict=True):
@@ -239,20 +238,6 @@ def exchanged(choice: Choice) -> list[tuple[list[Start], list[Start], Tried]]:
     ]
 
 
-def _is_pushed(rival: Tried, chosen: Tried, brought: float) -> bool:
-    """Whether a rival fits worse, with a number on its wall that the chosen effects leave off it.
-
-    What is only roughly known stands there where something else is missing: a turning scrub with
-    the centre of mass at its wall stood beside a centre of mass aside, and so did nothing at all.
-
-    Args:
-      brought: chi2, by the effect in whose place the rival would stand.
-    """
-    theirs, ours = (set(bounded.at_walls(t.fitted.variant.offsets)) for t in (rival, chosen))
-    behind = rival.price - chosen.price
-    return bool(theirs - ours) and behind >= rules.not_ruled_out(gain=brought)
-
-
 def _harm(base: Base, rival: Fitted, chosen: Fitted) -> float:
     """Chi2 by which a rival fits runs worse than nothing does which the chosen effects fit.
 
@@ -275,7 +260,7 @@ def _not_ruled_out(rival: Tried, chosen: Tried, brought: float, harm: float = 0.
     It is also out where all windows but the one that tells most against it rule it out: that one
     makes the scatter over windows so large that it hides what the others say.
     """
-    if _is_pushed(rival, chosen, brought):
+    if is_pushed(rival, chosen, brought):
         return False
     difference = rival.fitted.chi2 - chosen.fitted.chi2
     behind = rival.price - chosen.price
