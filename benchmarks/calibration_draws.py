@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import alternatives, forward_selection, hypotheses, selection
+from mjchair.diagnosis.explain import alternatives, hypotheses, selection
 from mjchair.diagnosis.explain import gap as gaps
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.fits import Fits
@@ -494,8 +494,6 @@ class Weighing:
 def linear() -> Iterator[None]:
     """The selection with linear algebra in place of simulations."""
     with (
-        # around a fit the algebra is what it is around the chair without effects
-        mock.patch.object(forward_selection, "beside", lambda _fits, _best: None),
         # a linear system neither slides nor shimmies, and goes another way nowhere
         mock.patch.object(alternatives, "or_whole", lambda _fits, here: here),
         mock.patch.object(alternatives, "or_whole_beside", lambda _fits, here: here),
