@@ -272,7 +272,8 @@ def test_a_lab_without_torque_gets_none():
 
 def test_hands_are_not_asked_to_hold_a_torque_for_seconds():
     by_hand = {m.name for m in possible(Setting((0.0, 0.0), 0.0, 10.0, by_hand=True))}
-    assert set(BY_NAME) - by_hand == {"long steps", "circle"}
+    held = {"long steps", "circle", "driven spin", "reverse, then forward"}
+    assert set(BY_NAME) - by_hand == held
 
 
 def test_with_one_wheel_measured_nothing_that_turns_is_asked_for():

@@ -635,6 +635,17 @@ def test_without_a_turn_measured_nothing_is_said_of_turning():
     ]
 
 
+def test_what_is_left_goes_with_what_was_measured():
+    """Of a chair whose turns nothing tells, the first screen said that it goes with heading."""
+    found = diagnosis(Verdict.AMBIGUOUS)
+    found.more_missing = True
+    heading = MissingForce(force=Force.YAW, goes_with=Driver(Quantity.HEADING), sigmas=99.0)
+    found.drivers = [heading, *found.drivers]
+    assert "goes with heading" in words.remainder_words(found)
+    found.evidence = dataclasses.replace(found.evidence, turns=False)
+    assert "goes with stroke" in words.remainder_words(found)
+
+
 def test_mean_forces_are_not_drawn_towards_zero():
     """A truth of 3.8 N comes back where the smoothed force, with its prior, says far less."""
     pulses = [

@@ -20,6 +20,7 @@ from mjchair.diagnosis.explain import (
     alternatives,
     backward_elimination,
     choice,
+    event,
     forward_selection,
     hypotheses,
     left_out,
@@ -106,6 +107,7 @@ def fits(monkeypatch):
         )
 
     monkeypatch.setattr(rules, "NOTHING", 0.0)  # no effect is so small that columns hold
+    monkeypatch.setattr(forward_selection, "_happened_once", lambda *_: False)
     monkeypatch.setattr(probable, "probabilities", lambda *_: {})
     monkeypatch.setattr(whole_sizes, "fits", lambda *_: ())
     monkeypatch.setattr(whole_beside, "fits", lambda *_: ())
@@ -940,6 +942,35 @@ def test_an_effect_of_a_whole_size_may_be_better_than_several(fits, monkeypatch,
     one = (Tried(ONE, fit(1500.0, "rolling")), closed)
     assert alternatives.or_whole_beside(looking, one) is one
     assert len(looked) == 2
+
+
+@pytest.mark.parametrize(
+    ("event_brings", "left"),
+    [
+        (400.0, "two"),  # the effect brings far more
+        (505.0, "one"),  # as much: it may have happened once
+        (1000.0, "none"),
+    ],
+)
+def test_beside_what_happened_once_no_second_effect_is_sought(
+    fits, monkeypatch, event_brings, left
+):
+    """A knock in one run came as a relaxation length with a caster's friction, after 616 s."""
+    monkeypatch.undo()
+    monkeypatch.setattr(forward_selection.event, "largest", lambda _: event.Event(event_brings))
+    monkeypatch.setattr(forward_selection.left_out, "held_out_shows", lambda _: False)
+    gap = SimpleNamespace(exists=True, excess=500.0)
+    monkeypatch.setattr(fits_of_hypotheses, "gap_after", lambda *_: gap)
+    monkeypatch.setattr(forward_selection, "is_worth", lambda *_: True)
+    monkeypatch.setattr(forward_selection, "_settled", lambda _, here: here)
+    monkeypatch.setattr(forward_selection, "_or_left_over", lambda _, here: here)
+    for name in ("or_as_given", "or_by_most_windows", "or_other_form", "or_whole"):
+        monkeypatch.setattr(alternatives, name, lambda _, here: here)
+    one = Tried(ONE, fit(1500.0, "rolling")), gap
+    two = Tried(BOTH, fit(1100.0, "rolling", "motor")), SimpleNamespace(exists=False)
+    monkeypatch.setattr(forward_selection, "further", lambda _, best, size: (one, two)[size - 1])
+    expected = {"two": two, "one": one, "none": None}[left]
+    assert forward_selection._grown_from(searching(), None) == expected
 
 
 @pytest.mark.parametrize("shimmies", [False, True])

@@ -152,6 +152,21 @@ def test_alike_torques_do_not_spin_a_chair_on_the_spot(tmp_path):
             mjchair.read_study(folder)
 
 
+@pytest.mark.parametrize(
+    ("right", "torque", "wrong"), [(2.0, -3.0, True), (2.0, 3.0, False), (-2.0, -3.0, False)]
+)
+def test_opposite_torques_do_not_drive_a_chair_straight(right, torque, wrong, tmp_path):
+    """One torque of the other sign came as a torque's gain of -86 %, after 256 s."""
+    stroke = 1.0 + 0.5 * np.sin(TIME)
+    columns = {"left_wheel_speed": 2.0 * stroke, "right_wheel_speed": right * stroke}
+    columns |= {"left_wheel": 3.0 * stroke, "right_wheel": torque * stroke}
+    folder = write(tmp_path, columns)
+    if wrong:
+        fails(folder, "are opposite, and the chair rolls straight")
+    else:
+        mjchair.read_study(folder)
+
+
 def test_torques_that_take_what_the_chair_never_had_are_noted(tmp_path):
     """Positive torque drives forward; brakes that slow the chair down are no such case."""
     for speed, torque, doubt in ((3.0, -6.0, True), (3.0, 6.0, False), (9.0, -6.0, False)):

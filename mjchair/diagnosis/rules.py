@@ -420,6 +420,18 @@ def happened_once(*, event: float, gain: float, held: HeldOut | None = None) -> 
     return event > CARRIES * gain and not (held is not None and shows_again(held))
 
 
+def is_clearly_once(*, event: float, gain: float, excess: float) -> bool:
+    """Whether an event in time explains a gap, and stands beside the best single effect.
+
+    Then no second effect beside that one would be named.
+
+    Args:
+      event: chi2 that forces bring which act for a moment in one run. gain: that the effect brings.
+      excess: chi2 of the gap.
+    """
+    return event >= CLOSES * excess and happened_once(event=event, gain=gain)
+
+
 def beside_event(*, linear: float, fitted: float) -> float:
     """Chi2 that effects bring, as it is held against what an event does.
 

@@ -271,7 +271,8 @@ def remainder_words(diagnosis: Diagnosis) -> str:
     after = diagnosis.gap.after if diagnosis.gap else None
     left = ""
     if not ends or after is None or after > 1.0:
-        goes = str(diagnosis.drivers[0].goes_with) if diagnosis.drivers else ""
+        known = known_drivers(diagnosis)
+        goes = str(known[0].goes_with) if known else ""
         left = f"; what is left goes with {goes}" if goes else "; a remainder is left"
     return (
         f"More is missing than what is named here, which explains {share_closed} of the gap"

@@ -57,6 +57,7 @@ def check(trial: Trial, axle: RearAxle, mass: float) -> list[str]:
         return said
     if {f"{side}_wheel" for side in SIDES} <= set(trial.inputs.controls):
         _check_equal(trial, trial.inputs, axle, stories.get("wheels"))
+        _check_opposite(trial, trial.inputs, axle, stories.get("wheels"))
         _check_moment(trial, trial.inputs, stories)
     return said + _torque(trial, trial.inputs, axle, mass)
 
@@ -121,6 +122,24 @@ def _check_equal(trial: Trial, inputs: Inputs, axle: RearAxle, wheels: Story | N
         raise MjchairError(
             f"{trial.name}: the wheels roll opposite ways, and their torques are alike: does one "
             "wheel count down as it rolls forward? Turn its sign"
+        )
+
+
+def _check_opposite(trial: Trial, inputs: Inputs, axle: RearAxle, wheels: Story | None) -> None:
+    """Torques that are opposite turn a chair on the spot, and none that rolls on.
+
+    Args:
+      wheels: how fast it turns by the difference of its wheels; None: not both were measured.
+    """
+    if wheels is None or np.sqrt(np.mean(wheels.values**2)) > UNSEEN * SPUN:
+        return
+    left, right = (_torque_at(inputs, side, wheels.time) for side in SIDES)
+    on = np.linalg.norm(left - right) > IDLE * np.sqrt(left.size)
+    rolls = any(abs(s.values.mean()) > PUSHED for s in _speeds(trial, axle).values())
+    if on and rolls and _differ_less(left, -right, ALIKE):
+        raise MjchairError(
+            f"{trial.name}: the torques of the two wheels are opposite, and the chair rolls "
+            "straight; positive torque drives forward: turn the sign of one of them"
         )
 
 

@@ -1,17 +1,25 @@
 """The most that something that happened once explains: a push, a bump, a gust in one run.
 
-In: the screened columns, among them forces that act in one second of one run. Out: which brings
-most chi2, in two seconds, or in all of a run in which somebody may have pushed. Where it is about
-what an effect brings, nothing tells the two apart: a place that is passed once looks like a moment.
+In: the screened columns, among them forces that act in one second of one run, and pulses of force.
+Out: which brings most chi2, in two seconds, or in all of a run in which somebody may have pushed.
+Where it is about what an effect brings, nothing tells the two apart: a place that is passed once
+looks like a moment.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from mjchair.diagnosis.data.sign_checks import gains_undriven
-from mjchair.diagnosis.explain.column_ids import ForceColumn, Quantity
+from mjchair.diagnosis.explain.column_ids import Driver, ForceColumn, ForceGroup, Quantity
+from mjchair.diagnosis.explain.missing_force import shaped_column
 from mjchair.diagnosis.explain.screening import Base
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.column_ids import ColumnId
+from mjchair.diagnosis.replay.derivatives import Column
+from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.model.rolling import rear_axle
 
@@ -37,8 +45,8 @@ class Event:
 def largest(base: Base) -> Event:
     """The event of one run that brings most: force and yaw moment, free in each second.
 
-    It lasts for LASTS seconds; for the whole run where that gains speed and no torque is given,
-    since somebody may have pushed the chair.
+    It lasts for LASTS seconds, in which it may be of any course; for the whole run where that gains
+    speed and no torque is given, since somebody may have pushed the chair.
     """
     gaining = pushed(base.bench.simulator)
     moments: dict[str, dict[int, list[ForceColumn]]] = {}
@@ -51,7 +59,8 @@ def largest(base: Base) -> Event:
         whole = trial in gaining
         spans = [(min(run), max(run) + 1)] if whole else [(k, k + LASTS) for k in run]
         events += [Event(_gain(base, run, span), trial, *span, whole) for span in spans]
-    return max(events, key=lambda event: event.gain, default=Event(0.0))
+    most = max(events, key=lambda event: event.gain, default=Event(0.0))
+    return most if most.whole or not events else _of_any_course(base, most)
 
 
 def pushed(simulator: WindowSimulator) -> set[str]:
@@ -65,3 +74,29 @@ def _gain(base: Base, run: dict[int, list[ForceColumn]], span: tuple[int, int]) 
     """What the forces of a run bring between two seconds of its clock."""
     columns = [c for k in range(*span) for c in run.get(k, ())]
     return float(base.reduced.gain(base.reduced.index(columns)))
+
+
+def _of_any_course(base: Base, event: Event) -> Event:
+    """An event with a force and a yaw moment free in every pulse of its seconds.
+
+    What these bring by chance, 1 of chi2 each, does not count. A knock of 40 N for 0.3 s lost speed
+    that a force of a whole second lost too slowly: it brought 1434 of 2482, and a relaxation length
+    of all runs had the rest.
+    """
+    bench, around = base.bench, base.around
+    simulator = bench.simulator
+    columns: dict[ColumnId, Column] = {}
+    for k, pulse in enumerate(around.pulses):
+        trial = simulator.study.runs[simulator.windows[pulse.window].run].trial.name
+        inside = trial == event.trial and event.begin <= pulse.time < event.end
+        if inside and pulse.force != Force.LEFTWARD:
+            group = ForceGroup(pulse.force, Driver(Quantity.TIME, trial))
+            alone = np.eye(1, len(around.pulses), k)[0]
+            columns[ForceColumn(group, k)] = shaped_column(
+                bench, around.pulses, around.answers, alone
+            )
+    known = {**base.nuisances, **columns}
+    system = bench.system(around.track, known, len(base.nuisances), around.variant)
+    reduced = bounded.reduce(system, bench.windows)
+    brings = float(reduced.gain(reduced.index(list(columns)))) - len(columns)
+    return replace(event, gain=max(event.gain, brings))

@@ -7,7 +7,7 @@ grows as long as it leaves a gap and a further effect is worth it.
 from __future__ import annotations
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import alternatives, left_over, whole_sizes
+from mjchair.diagnosis.explain import alternatives, event, left_out, left_over, whole_sizes
 from mjchair.diagnosis.explain.choice import Tried
 from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.screening import gain, goes_far
@@ -38,6 +38,8 @@ def _grown_from(fits: Fits, here: WithGap | None) -> WithGap | None:
     """The best hypothesis, grown from this one; None: there is none."""
     size = len(here[0].hypothesis.starts) if here else 0
     while size < rules.MOST and (here is None or here[1].exists):
+        if size == 1 and _happened_once(fits, brought := _brought(fits, here)):
+            return None if _is_rather_once(fits, brought) else here
         size += 1
         more = further(fits, here[0] if here else None, size)
         if size == 1:
@@ -55,6 +57,33 @@ def _grown_from(fits: Fits, here: WithGap | None) -> WithGap | None:
             here = alternatives.or_other_form(fits, _or_left_over(fits, here))
             here = alternatives.or_whole(fits, here)
     return here
+
+
+def _happened_once(fits: Fits, brought: float) -> bool:
+    """Whether what happened once explains the gap as well as the best single effect does.
+
+    A second effect would only follow it: a knock took 616 s of fits, and came as two effects.
+
+    Args:
+      brought: chi2 by the best single effect.
+    """
+    base = fits.base
+    return not left_out.held_out_shows(base) and rules.is_clearly_once(
+        event=event.largest(base).gain,
+        gain=brought,
+        excess=fits.gap_after(base.plain).excess,
+    )
+
+
+def _is_rather_once(fits: Fits, brought: float) -> bool:
+    """Whether what happened once explains so much more that no effect is an answer."""
+    once = event.largest(fits.base).gain
+    return rules.is_of_one_run(by=once - brought, gain=once)
+
+
+def _brought(fits: Fits, here: WithGap | None) -> float:
+    """Chi2 that the best effects so far bring; 0: there are none."""
+    return gain(fits.base, here[0].fitted) if here else 0.0
 
 
 def _promises(fits: Fits) -> bool:

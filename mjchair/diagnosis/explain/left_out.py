@@ -234,7 +234,10 @@ def plain_gap(base: Base) -> Gap:
     What is only roughly known may take an effect for itself, and then foretells wrongly.
     """
     gap = confirmed(base, base.plain, gap_after(base, base.plain))
+    return replace(gap, exists=True) if held_out_shows(base) else gap
+
+
+def held_out_shows(base: Base) -> bool:
+    """Whether the chair without effects is far off on held-out trials, if there are any."""
     held = held_windows(base)
-    if held.size and rules.foretells_wrongly(*_foretold(base, base.plain, held)):
-        return replace(gap, exists=True)
-    return gap
+    return bool(held.size) and rules.foretells_wrongly(*_foretold(base, base.plain, held))

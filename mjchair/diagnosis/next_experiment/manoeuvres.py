@@ -244,11 +244,13 @@ LIBRARY = (  # simplest first
         yaw_rate=0.2,
         torque=_flip,
         seconds=4.0,
+        motor=True,
     ),
     Manoeuvre(
         "driven spin",
         "Drive it on the spot from a standstill, 3 s to the left and 3 s to the right",
         torque=_spin,
+        motor=True,
     ),
     Manoeuvre(
         "circle",
