@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import alternatives, hypotheses, selection
+from mjchair.diagnosis.explain import alternatives, forward_selection, hypotheses, selection
 from mjchair.diagnosis.explain import gap as gaps
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.fits import Fits
@@ -498,6 +498,8 @@ def linear() -> Iterator[None]:
         mock.patch.object(alternatives, "or_whole", lambda _fits, here: here),
         mock.patch.object(alternatives, "or_whole_beside", lambda _fits, here: here),
         mock.patch.object(alternatives, "or_by_most_windows", lambda _fits, here: here),
+        # what happened once is sought with pulses, and what is drawn acts in every run
+        mock.patch.object(forward_selection, "_happened_once", lambda *_: False),
         mock.patch.object(selection, "confirmed", lambda _base, _fitted, gap: gap),
         mock.patch.object(gaps, "DRAWS", DRAWS),
         mock.patch.object(gaps, "_cell_tests", lambda *_: []),
