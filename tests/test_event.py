@@ -11,6 +11,7 @@ import mjchair
 from mjchair.diagnosis import notes, rules
 from mjchair.diagnosis.explain import event
 from mjchair.diagnosis.explain.column_ids import Driver, ForceColumn, ForceGroup, Quantity
+from mjchair.diagnosis.next_experiment import wording
 from mjchair.diagnosis.replay.pulses import Force, Pulse
 from mjchair.measurement.trial import Trial
 
@@ -113,6 +114,15 @@ def test_where_a_knock_explains_the_gap_no_second_effect_is_sought():
     assert rules.is_clearly_once(event=2480.0, gain=390.0, excess=2400.0)
     assert not rules.is_clearly_once(event=2000.0, gain=2600.0, excess=2400.0)
     assert not rules.is_clearly_once(event=1400.0, gain=390.0, excess=2400.0)
+
+
+@pytest.mark.parametrize(("gain", "explains"), [(500.0, True), (300.0, False)])
+def test_an_event_that_explains_a_gap_is_told_with_its_run_and_time(gain, explains, monkeypatch):
+    once = event.Event(gain=gain, trial="r2", begin=2, end=4)
+    monkeypatch.setattr(event, "largest", lambda _: once)
+    gap = SimpleNamespace(tests=[SimpleNamespace(statistic=x) for x in (450.0, 20.0)])
+    assert event.explaining(None, gap) == (once if explains else None)
+    assert "r2 between 2 and 4 s" in wording.looking_at("r2", 2, 4)
 
 
 def test_what_to_do_about_an_event_is_to_cut_it_out_but_not_a_whole_run():

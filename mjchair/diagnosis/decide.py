@@ -134,7 +134,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         candidates=_candidates(base, gap, choice),
         gap=_summary(base, gap, named, over_noise(held.after, held.dof) if held else foretold),
         where=_where(base),
-        next_experiment=_following(base, choice, said, plan, left, alone),
+        next_experiment=_following(base, gap, choice, said, plan, left, alone),
         notes=[
             *notes.notes_on(base, gap, choice, stands, said=said, left=left, alone=alone),
             *(notes.of_uneven(d) for d in differing if named),
@@ -310,6 +310,7 @@ def _plan(base: Base, choice: Choice, once: bool) -> tuple[Plan | None, list[str
 
 def _following(
     base: Base,
+    gap: Gap,
     choice: Choice | None,
     said: Verdict,
     plan: Plan | None,
@@ -332,6 +333,9 @@ def _following(
         lone = lone_run(base, choice.fitted if choice else base.plain)
         if lone is not None:
             return wording.letting_in(*lone)
+        once = event.explaining(base, gap)
+        if once is not None and not once.whole:
+            return wording.looking_at(once.trial, once.begin, once.end)
         drivers = [(force.goes_with, force.sigmas) for force in left]
         return wording.searching(drivers, event.pushed(base.bench.simulator))
     if said == Verdict.NAMED:

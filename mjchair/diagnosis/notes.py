@@ -87,9 +87,9 @@ def notes_on(
         return notes
     if choice is not None and stands is not None:
         notes.append(no_answer(choice, stands))
-    once = event.largest(base)
-    most = max((t.statistic for t in gap.tests), default=0.0)
-    if rules.happened_once(event=once.gain, gain=most):
+    once = event.explaining(base, gap)
+    if once is not None:
+        most = max(t.statistic for t in gap.tests)
         notes.append(of_event(once, min(once.gain / most, 1.0)))
     elif any(force.goes_with.quantity == Quantity.STROKE for force in left[:TOP]):
         notes.append(

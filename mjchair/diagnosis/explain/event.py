@@ -12,8 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mjchair.diagnosis import rules
 from mjchair.diagnosis.data.sign_checks import gains_undriven
 from mjchair.diagnosis.explain.column_ids import Driver, ForceColumn, ForceGroup, Quantity
+from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.missing_force import shaped_column
 from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.fit import bounded
@@ -61,6 +63,13 @@ def largest(base: Base) -> Event:
         events += [Event(_gain(base, run, span), trial, *span, whole) for span in spans]
     most = max(events, key=lambda event: event.gain, default=Event(0.0))
     return most if most.whole or not events else _of_any_course(base, most)
+
+
+def explaining(base: Base, gap: Gap) -> Event | None:
+    """The event that explains a gap about as well as any test shows it; None: none does."""
+    once = largest(base)
+    most = max((t.statistic for t in gap.tests), default=0.0)
+    return once if rules.happened_once(event=once.gain, gain=most) else None
 
 
 def pushed(simulator: WindowSimulator) -> set[str]:

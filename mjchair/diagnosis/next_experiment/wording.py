@@ -222,6 +222,15 @@ def leaving_out(run: str) -> str:
     )
 
 
+def looking_at(run: str, begin: int, end: int) -> str:
+    """What to do about what happened once in a run, by its name, between two seconds (s)."""
+    return (
+        f"Look at {run} between {begin} and {end} s: a knock, a hand or a bump that acted once "
+        "explains what is missing. End the trial before, or begin it after, and diagnose again; "
+        "or repeat it exactly as it was: what happened once does not come back."
+    )
+
+
 def repeating(run: str) -> str:
     """What to do where what one run shows, by its name, may be of this run or of all."""
     return (
