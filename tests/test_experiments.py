@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -19,13 +20,13 @@ from mjchair.diagnosis.fit import process
 from mjchair.diagnosis.fit.nonlinear import refit
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.next_experiment import design, wording
-from mjchair.diagnosis.next_experiment.design import Evidence, Experiment, Plan
+from mjchair.diagnosis.next_experiment.design import Evidence, Experiment, Plan, telling
 from mjchair.diagnosis.next_experiment.manoeuvres import LIBRARY, Setting, possible, setting
 from mjchair.diagnosis.next_experiment.rehearsal import Rehearsal, Version
 from mjchair.diagnosis.replay.pulses import pulse_answers, pulses
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.diagnosis.replay.window_states import track
-from mjchair.effects.effect import Effect, Parameter
+from mjchair.effects.effect import Effect, Parameter, SensorError
 from mjchair.effects.library import find
 from mjchair.errors import MjchairError
 from mjchair.model import inertials
@@ -268,6 +269,17 @@ def test_a_chair_that_is_shaken_promises_less(one_way, against_slope):
 def test_a_lab_without_torque_gets_none():
     assert all(m.torque is None for m in possible(Setting((0.0, 0.0), 0.0, 0.0)))
     assert len(possible(Setting((0.0, 0.0), 0.0, 10.0))) == len(LIBRARY)
+
+
+@pytest.mark.parametrize("sensor", [None, SensorError.BIAS])
+def test_standing_still_tells_of_sensors_only(sensor):
+    """How a model settles drew a rolling resistance to a bearing's friction."""
+    asked = SimpleNamespace(effect=SimpleNamespace(sensor=sensor))
+    rolls = SimpleNamespace(effect=SimpleNamespace(sensor=None))
+    chairs = [Variant((), terms=(rolls,)), Variant((), terms=(rolls, asked))]
+    told = [m.name for m in telling(LIBRARY, chairs)]
+    left_out = {m.name for m in LIBRARY} - set(told)
+    assert left_out == (set() if sensor else {"stand"})
 
 
 def test_hands_are_not_asked_to_hold_a_torque_for_seconds():

@@ -49,6 +49,11 @@ class Manoeuvre:
     motor: bool = False
 
     @property
+    def stands(self) -> bool:
+        """Whether the chair stands still."""
+        return self.torque is None and not self.speed and not self.yaw_rate
+
+    @property
     def turns(self) -> bool:
         """Whether its two rear wheels do not roll alike."""
         if self.torque is None or self.yaw_rate:
