@@ -153,18 +153,33 @@ def test_alike_torques_do_not_spin_a_chair_on_the_spot(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("right", "torque", "wrong"), [(2.0, -3.0, True), (2.0, 3.0, False), (-2.0, -3.0, False)]
+    ("sign", "steers", "wrong"), [(-1.0, False, True), (1.0, False, False), (-1.0, True, False)]
 )
-def test_opposite_torques_do_not_drive_a_chair_straight(right, torque, wrong, tmp_path):
-    """One torque of the other sign came as a torque's gain of -86 %, after 256 s."""
-    stroke = 1.0 + 0.5 * np.sin(TIME)
-    columns = {"left_wheel_speed": 2.0 * stroke, "right_wheel_speed": right * stroke}
-    columns |= {"left_wheel": 3.0 * stroke, "right_wheel": torque * stroke}
+def test_opposite_torques_do_not_drive_a_chair_faster(sign, steers, wrong, tmp_path):
+    """One torque of the other sign came as a gain of -86 % after 256 s; a slalom has its signs."""
+    torque = 6.0 * np.sin(2.0 * np.pi * TIME / 1.3)
+    stroke = torque if steers else np.maximum(torque, 0.0)
+    swing = 0.1 * np.cumsum(stroke) * (TIME[1] - TIME[0])
+    left = 4.0 - swing if steers else 4.0 + swing  # a turn to the left is positive
+    columns = {"left_wheel_speed": left, "right_wheel_speed": 4.0 + swing}
+    columns |= {"left_wheel": sign * stroke, "right_wheel": stroke}
     folder = write(tmp_path, columns)
     if wrong:
-        fails(folder, "are opposite, and the chair rolls straight")
+        fails(folder, "are opposite, and the chair rolls straight and faster with them")
     else:
         mjchair.read_study(folder)
+
+
+@pytest.mark.parametrize(("loses", "noted"), [(0.0, True), (0.05, False)])
+def test_a_chair_that_keeps_its_speed_without_torque_may_be_pushed(
+    loses, noted, tmp_path, monkeypatch
+):
+    """An attendant who pushed at 1 m/s came as a floor that falls by 1.2 %."""
+    monkeypatch.setattr(f"{__name__}.TIME", np.arange(0.0, 4.0, 0.02))
+    speed = (1.0 - loses * TIME) / 0.3 + 0.01 * np.sin(40.0 * TIME)
+    columns = {f"{side}_wheel_speed": speed for side in SIDES}
+    notes = mjchair.read_study(write(tmp_path, columns)).notes
+    assert any("keeps its 1 m/s" in note and "pushed" in note for note in notes) == noted
 
 
 def test_torques_that_take_what_the_chair_never_had_are_noted(tmp_path):

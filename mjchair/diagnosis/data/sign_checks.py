@@ -11,6 +11,8 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
+from scipy.signal import detrend
 
 from mjchair.diagnosis.data.trial_checks import averaged
 from mjchair.diagnosis.data.unit_checks import YAW, Story, at, forward, turning, wheel_pairs
@@ -28,6 +30,12 @@ SWAPPED = 0.8  # cosine of a turning moment with what turns the chair, beyond wh
 FEW = 8  # samples, of which less tells no course
 PUSHED = 0.3  # m/s, that a chair gains at PULLED or more only if something drives it, or downhill
 PULLED = 0.3  # m/s^2, as a slope of 3 %
+GO = 0.7  # correlation of what goes together
+VARIES = 0.02  # m/s, rms of a speed that does
+LONG, ROLLS = 3.0, 0.3  # s and m/s, of a chair that rolls on
+# m/s^2 that a coast loses at least: tires that roll with 0.002, less than any on a hard floor
+# (0.004 to 0.02: Sauret et al. 2012), without bearings or air (assumption)
+COASTS = 0.02
 TOLD = 0.3  # of a torque, in rms, that must go with speed and its gain (0.34 of one in strokes)
 ALIKE = 0.5  # of their sum: torques whose difference is less are alike (rms)
 ASIDE = 0.2  # of their sum: a centre of mass 55 mm aside turns a chair as much as such a difference
@@ -126,7 +134,7 @@ def _check_equal(trial: Trial, inputs: Inputs, axle: RearAxle, wheels: Story | N
 
 
 def _check_opposite(trial: Trial, inputs: Inputs, axle: RearAxle, wheels: Story | None) -> None:
-    """Torques that are opposite turn a chair on the spot, and none that rolls on.
+    """Torques that are opposite turn a chair, and make none that rolls straight faster.
 
     Args:
       wheels: how fast it turns by the difference of its wheels; None: not both were measured.
@@ -135,12 +143,26 @@ def _check_opposite(trial: Trial, inputs: Inputs, axle: RearAxle, wheels: Story 
         return
     left, right = (_torque_at(inputs, side, wheels.time) for side in SIDES)
     on = np.linalg.norm(left - right) > IDLE * np.sqrt(left.size)
-    rolls = any(abs(s.values.mean()) > PUSHED for s in _speeds(trial, axle).values())
-    if on and rolls and _differ_less(left, -right, ALIKE):
+    if not on or not _differ_less(left, -right, ALIKE):
+        return
+    pushed = cumulative_trapezoid(left - right, wheels.time, initial=0.0)
+    if any(
+        abs(_go_together(at(one, wheels.time) + at(two, wheels.time), pushed)) > GO
+        for one, two in wheel_pairs(forward(trial, axle))
+    ):
         raise MjchairError(
             f"{trial.name}: the torques of the two wheels are opposite, and the chair rolls "
-            "straight; positive torque drives forward: turn the sign of one of them"
+            "straight and faster with them; positive torque drives forward: turn the sign of one "
+            "of them"
         )
+
+
+def _go_together(speed: Array, values: Array) -> float:
+    """Correlation of a speed (n,), m/s, with values, both without trends; 0 if it hardly varies."""
+    one, two = detrend(speed), detrend(values)
+    if np.linalg.norm(one) < VARIES * np.sqrt(one.size):
+        return 0.0
+    return float(one @ two / max(np.linalg.norm(one) * np.linalg.norm(two), 1e-300))
 
 
 def _differ_less(left: Array, right: Array, share: float) -> bool:
@@ -220,13 +242,24 @@ def _gains(trial: Trial, axle: RearAxle) -> list[str]:
     for name, story in _speeds(trial, axle).items():
         speed = np.abs(story.values)
         gained = float(np.max(speed - np.minimum.accumulate(speed)))
-        if gained > PUSHED:
+        does = f"gains {gained:.2g} m/s" if gained > PUSHED else _keeps_speed(story)
+        if does:
             return [
-                f"{trial.name}: by {name} it gains {gained:.2g} m/s and no torque is given, so "
+                f"{trial.name}: by {name} it {does} and no torque is given, so "
                 "it is taken to coast, down a slope or before a wind; if somebody pushed it, give "
                 "left_wheel and right_wheel, or only what follows the last push"
             ]
     return []
+
+
+def _keeps_speed(story: Story) -> str:
+    """What a chair does that rolls for LONG and loses less than a coast; empty: it does not."""
+    lasts = float(story.time[-1] - story.time[0])
+    mean = float(abs(story.values.mean()))
+    if lasts < LONG or mean < ROLLS:
+        return ""
+    loses = -float(np.polyfit(story.time, np.abs(story.values), 1)[0])
+    return f"keeps its {mean:.2g} m/s for {lasts:.2g} s" if loses < COASTS else ""
 
 
 def _is_still(inputs: Inputs) -> bool:
