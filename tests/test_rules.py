@@ -508,6 +508,9 @@ def test_the_price_of_parameters_counts_beside_the_scatter_of_windows():
     difference = np.array([10.9, 1.2, 1.2, 0.6, -0.6, 0.4, 0.1, 0.0])
     assert rules.paired_errors(difference.sum(), difference) < rules.RIVAL_ERRORS
     assert rules.paired_errors(difference.sum() + 45.0, difference) > rules.RIVAL_ERRORS
+    # one number in the place of six does not excuse what it misses
+    fewer = rules.paired_errors(difference.sum() - 10.0, difference)
+    assert fewer == rules.paired_errors(difference.sum(), difference)
 
 
 def test_what_leaves_a_number_on_its_wall_is_not_named_alone():

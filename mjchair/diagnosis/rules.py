@@ -754,11 +754,13 @@ def to_show_again(*, event: float, gain: float) -> float:
 def paired_errors(behind: float, difference: Array) -> float:
     """By how many standard errors, over windows, a rival is worse: Vuong's corrected ratio.
 
-    Vuong, "Likelihood ratio tests for model selection and non-nested hypotheses", 1989.
+    Vuong, "Likelihood ratio tests for model selection and non-nested hypotheses", 1989. Further
+    numbers of a rival count against it; that it has fewer excuses nothing that it misses.
 
     Args:
       behind: chi2 with penalties by which it is. difference: of chi2, in each window, (windows,).
     """
+    behind = max(behind, float(difference.sum()))
     if difference.size < 2:
         return behind
     spread = float(difference.std(ddof=1)) * math.sqrt(difference.size)
