@@ -23,6 +23,7 @@ import tomli_w
 from mjchair.effects import user_file
 from mjchair.effects.effect import Effect
 from mjchair.errors import MjchairError
+from mjchair.model import parts
 from mjchair.model.load import Load, strap
 from mjchair.model.parameters import ChairParameters
 from mjchair.model.spec import compile_spec, load_spec
@@ -67,6 +68,13 @@ def _reverse() -> Inputs:
     return Inputs(time, {"left_wheel": push, "right_wheel": push}, "reverse")
 
 
+def _swerve(more: float) -> Inputs:
+    """Torque of a turn so fast that the tires slip, `more` (N m) at the right than on the mean."""
+    time = np.arange(0.0, SECONDS, 0.01)
+    torque = {w: 2.5 - more * side * np.ones(time.size) for w, side in parts.SIDE.items()}
+    return Inputs(time, torque, "swerve")
+
+
 def _spin() -> Inputs:
     """Torque on the spot, half the time to the left and half to the right."""
     time = np.arange(0.0, SECONDS, 0.01)
@@ -88,8 +96,8 @@ def manoeuvres() -> list[Manoeuvre]:
     """The runs of a practice study.
 
     Together they tell apart what looks alike in a coast: a fast one shows air, a fast one each way
-    a slope or a wind, a turn on the spot toe, and a load the bearings, which do not feel it. None
-    is so fast that tires slide: with two that were, rolling resistance was not told from toe.
+    a slope or a wind, a turn on the spot toe, a fast turn how tires slide, and a load the bearings,
+    which do not feel it.
     """
     strokes = push_strokes({"left_wheel": 12.0, "right_wheel": 12.0}, SECONDS)
     there, back = ({"heading": h, "position": (x, 0.0)} for h, x in ((0.0, 0.0), (np.pi, 14.0)))
@@ -101,6 +109,8 @@ def manoeuvres() -> list[Manoeuvre]:
         Manoeuvre("slalom", {"speed": 1.0, "heading": -0.6}, _slalom(), LOAD),
         Manoeuvre("reverse", {"speed": -0.5, "heading": 2.2, "yaw_rate": 0.2}, _reverse()),
         Manoeuvre("spin", {"heading": -1.5}, _spin()),
+        Manoeuvre("swerve", {"speed": 2.0, "heading": 0.3, "yaw_rate": 1.3}, _swerve(3.0)),
+        Manoeuvre("swerve", {"speed": 2.1, "heading": 0.9, "yaw_rate": -1.1}, _swerve(-2.7), LOAD),
     ]
 
 

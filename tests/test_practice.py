@@ -1,4 +1,4 @@
-"""Practice studies: what hides in them is there as the diagnosis knows it."""
+"""Practice studies: what hides in them is there as the diagnosis knows it, and shows."""
 
 import csv
 import io
@@ -6,8 +6,11 @@ import io
 import numpy as np
 import pytest
 
+import mjchair
 from mjchair import practice
 from mjchair.effects.library import find
+
+SHOWS = 100.0  # of chi2 against the sensors' noise, clear of what a run's first state takes
 
 
 def _tables(files):
@@ -41,3 +44,18 @@ def test_a_motor_that_nothing_drives_does_not_brake(without):
     """The diagnosis has its drive off in a coast: a motor's braking came out as a bearing's."""
     differs = _differs(_tables(practice.hide(find("back_emf"))), without)
     assert all((by == 0.0) == name.startswith("coast") for name, by in differs.items())
+
+
+def test_tires_slide_on_a_floor_half_as_rough(without):
+    differs = _differs(_tables(practice.hide(find("tire_friction"))), without)
+    shown = {name for name, by in differs.items() if by > SHOWS}
+    assert shown >= {"swerve_7.csv", "swerve_8.csv"}  # one alone is no answer
+
+
+def test_a_swerve_slides_and_all_wheels_stay_on_the_floor():
+    for made in practice.manoeuvres():
+        if made.word == "swerve":
+            run = practice._run(mjchair.load_spec(), made)
+            assert np.abs(run.channels["imu_accelerometer.y"]).max() > 1.9
+            loads = [np.min(v) for c, v in run.channels.items() if c.endswith("_tire.Fz")]
+            assert len(loads) == 4 and min(loads) > 0.0

@@ -25,4 +25,5 @@ EFFECT = Effect(
     signature="curvature in lateral acceleration",
     source="car tires 0.1-0.3; assumed similar",
     edit=edit,
+    example={"exponent": 0.4},
 )

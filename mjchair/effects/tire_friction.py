@@ -24,4 +24,5 @@ EFFECT = Effect(
     signature="the peak only; visible where a tire slides",
     source="wet or dusty floors 0.2-0.5 against 0.8",
     edit=edit,
+    example={"factor": 0.3},
 )
