@@ -1471,7 +1471,8 @@ def test_what_is_fitted_beside_several_effects_is_held_against_the_best_of_as_ma
     single = hypothesis_of("mass_offset")
     monkeypatch.setattr(probable, "_not_yet_fitted", lambda *_: [single, pair])
     monkeypatch.setattr(probable, "better_of", lambda *_: None)
-    several = SimpleNamespace(hypothesis=pair, fitted=SimpleNamespace(confined=0.0, total=1000.0))
+    fitted = SimpleNamespace(confined=0.0, total=1000.0)
+    several = Choice(hypothesis=pair, fitted=fitted, after=None, rivals=[], own_gains=[])
     probable.better_than(looking, several)
     assert asked == [tried[1], Tried(pair, several.fitted)]
 

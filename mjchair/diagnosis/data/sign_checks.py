@@ -33,8 +33,8 @@ PULLED = 0.3  # m/s^2, as a slope of 3 %
 GO = 0.7  # correlation of what goes together
 VARIES = 0.02  # m/s, rms of a speed that does
 LONG, ROLLS = 3.0, 0.3  # s and m/s, of a chair that rolls on
-# m/s^2 that a coast loses at least: tires that roll with 0.002, less than any on a hard floor
-# (0.004 to 0.02: Sauret et al. 2012), without bearings or air (assumption)
+# m/s^2 that a coast loses at least: a rolling resistance of 0.002, a third of the least of whole
+# chairs (0.006 to 0.02, effects/rolling_resistance.py; assumption)
 COASTS = 0.02
 TOLD = 0.3  # of a torque, in rms, that must go with speed and its gain (0.34 of one in strokes)
 ALIKE = 0.5  # of their sum: torques whose difference is less are alike (rms)

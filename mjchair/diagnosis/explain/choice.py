@@ -59,6 +59,11 @@ class Choice:
     dropped: list[str] = field(default_factory=list)
 
     @property
+    def own(self) -> Tried:
+        """The hypothesis with its fit."""
+        return Tried(self.hypothesis, self.fitted)
+
+    @property
     def brought(self) -> dict[str, float]:
         """Key of every effect -> the chi2 that it brings beside the others."""
         keys = (s.effect.key for s in self.hypothesis.starts)
@@ -67,6 +72,10 @@ class Choice:
     def brought_beyond(self, other: Hypothesis) -> float:
         """Chi2 that the effects bring which another hypothesis does without."""
         return sum(gain for key, gain in self.brought.items() if key not in other.keys)
+
+    def is_pushed(self, rival: Tried) -> bool:
+        """Whether a rival pushes a number to its wall that the choice does not; see `is_pushed`."""
+        return is_pushed(rival, self.own, self.brought_beyond(rival.hypothesis))
 
 
 def is_there(fitted: Fitted) -> bool:

@@ -10,13 +10,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.data.sign_checks import gains_undriven
 from mjchair.diagnosis.explain.column_ids import Driver, ForceColumn, ForceGroup, Quantity
 from mjchair.diagnosis.explain.gap import Gap
-from mjchair.diagnosis.explain.missing_force import shaped_column
+from mjchair.diagnosis.explain.missing_force import add_answer
 from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import ColumnId
@@ -45,10 +43,11 @@ class Event:
 
 
 def largest(base: Base) -> Event:
-    """The event of one run that brings most: force and yaw moment, free in each second.
+    """The event of one run that brings most: a force and a yaw moment.
 
-    It lasts for LASTS seconds, in which it may be of any course; for the whole run where that gains
-    speed and no torque is given, since somebody may have pushed the chair.
+    It lasts for LASTS seconds, found by forces of whole seconds, in which it may be of any course;
+    for the whole run where that gains speed and no torque is given, since somebody may have pushed
+    the chair.
     """
     gaining = pushed(base.bench.simulator)
     moments: dict[str, dict[int, list[ForceColumn]]] = {}
@@ -95,15 +94,12 @@ def _of_any_course(base: Base, event: Event) -> Event:
     bench, around = base.bench, base.around
     simulator = bench.simulator
     columns: dict[ColumnId, Column] = {}
-    for k, pulse in enumerate(around.pulses):
+    for k, (pulse, answer) in enumerate(zip(around.pulses, around.answers, strict=True)):
         trial = simulator.study.runs[simulator.windows[pulse.window].run].trial.name
         inside = trial == event.trial and event.begin <= pulse.time < event.end
         if inside and pulse.force != Force.LEFTWARD:
             group = ForceGroup(pulse.force, Driver(Quantity.TIME, trial))
-            alone = np.eye(1, len(around.pulses), k)[0]
-            columns[ForceColumn(group, k)] = shaped_column(
-                bench, around.pulses, around.answers, alone
-            )
+            add_answer(columns, bench, ForceColumn(group, k), pulse, answer)
     known = {**base.nuisances, **columns}
     system = bench.system(around.track, known, len(base.nuisances), around.variant)
     reduced = bounded.reduce(system, bench.windows)

@@ -119,16 +119,16 @@ def driver_columns(
             for pulse, answer in mine:
                 sizes = [float(s[0]) for s in shape(_at(known[pulse.window], pulse))]
                 for k, size in enumerate(sizes):
-                    _put(out, bench, ForceColumn(group, k), pulse, size * answer)
+                    add_answer(out, bench, ForceColumn(group, k), pulse, size * answer)
         for pulse, answer in mine:
             run = bench.simulator.windows[pulse.window].run
             trial = bench.simulator.study.runs[run].trial.name
             group = ForceGroup(force, Driver(Quantity.TIME, trial))
-            _put(out, bench, ForceColumn(group, int(pulse.time)), pulse, answer)
+            add_answer(out, bench, ForceColumn(group, int(pulse.time)), pulse, answer)
     return out
 
 
-def _put(
+def add_answer(
     out: dict[ColumnId, Column], bench: Bench, key: ColumnId, pulse: Pulse, answer: Array
 ) -> None:
     """Add an answer (rows, channels) to a column, in the pulse's window."""

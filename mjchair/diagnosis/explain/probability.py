@@ -20,7 +20,7 @@ from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import calibration, hypotheses
 from mjchair.diagnosis.explain.calibration import NONE, OUTSIDE, Chosen, Weight
 from mjchair.diagnosis.explain.candidates import Start
-from mjchair.diagnosis.explain.choice import Choice, Tried, is_pushed, is_there
+from mjchair.diagnosis.explain.choice import Choice, Tried, is_there
 from mjchair.diagnosis.explain.column_ids import ForceGroup
 from mjchair.diagnosis.explain.gap import groups
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
@@ -182,15 +182,14 @@ def _absent(choice: Choice | None) -> set[str]:
     """
     if choice is None:
         return set()
-    chosen = Tried(choice.hypothesis, choice.fitted)
+    chosen = choice.hypothesis
 
     def stands(t: Tried) -> bool:
-        fewer = set(t.hypothesis.keys) < set(chosen.hypothesis.keys)
-        pushed = is_pushed(t, chosen, choice.brought_beyond(t.hypothesis))
-        return is_there(t.fitted) and (fewer or not pushed)
+        fewer = set(t.hypothesis.keys) < set(chosen.keys)
+        return is_there(t.fitted) and (fewer or not choice.is_pushed(t))
 
     there = {t.hypothesis.name for t in choice.tried if stands(t)}
-    return {t.hypothesis.name for t in choice.tried} - there - {chosen.hypothesis.name}
+    return {t.hypothesis.name for t in choice.tried} - there - {chosen.name}
 
 
 def _evidence(reduced: Reduced, h: Hypothesis, gained: float, starts: Sequence[Start]) -> float:

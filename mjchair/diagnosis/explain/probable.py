@@ -26,7 +26,7 @@ FITTED = 3  # hypotheses, at most
 
 def better_than(fits: Fits, choice: Choice) -> Tried | None:
     """The best of the probable hypotheses that is better than the choice; None: none is."""
-    chosen = Tried(choice.hypothesis, choice.fitted)
+    chosen = choice.own
     made = [fits.fit(h, _best_of_size(fits, h, chosen)) for h in _not_yet_fitted(fits, choice)]
     found = [(t, choice.brought_beyond(t.hypothesis)) for t in made if t is not None]
     return better_of(fits, chosen, found)

@@ -187,9 +187,7 @@ def with_probable(choice: Choice, probability: Mapping[str, float]) -> Choice:
     likely = [
         t
         for t in choice.tried
-        if t.hypothesis.name in worth
-        and is_there(t.fitted)
-        and not is_pushed(t, Tried(chosen, choice.fitted), choice.brought_beyond(t.hypothesis))
+        if t.hypothesis.name in worth and is_there(t.fitted) and not choice.is_pushed(t)
     ]
     out = []
     for start, rivals in zip(chosen.starts, choice.rivals, strict=True):

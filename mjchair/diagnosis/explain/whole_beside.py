@@ -20,10 +20,12 @@ from mjchair.diagnosis import rules
 from mjchair.diagnosis.data.windows import calm
 from mjchair.diagnosis.explain import hypotheses, whole_sizes
 from mjchair.diagnosis.explain.candidates import Start
+from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.multistart import made_anew
 from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.explain.whole_sizes import Seen
 from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.variant import Variant
 from mjchair.diagnosis.replay.window_states import Track
@@ -61,11 +63,19 @@ def _with_best(
     columns = {**base.nuisances, **base.columns}
     system = base.bench.system(here, columns, len(base.nuisances), variant, only=windows)
     reduced = bounded.reduce(system, windows)
-    best = max(hypotheses.singles(reduced, others), key=lambda h: h.score, default=None)
-    if best is None or best.score <= 0.0 or not hypotheses.can_be(reduced, best):
+    best = _best_of(reduced, others)
+    if best is None:
         return Seen(reduced.total, variant)
     terms = (*variant.terms, *hypotheses.terms(reduced, best))
     return Seen(reduced.total - best.score, replace(variant, terms=terms), best.starts)
+
+
+def _best_of(reduced: Reduced, others: Sequence[Start]) -> Hypothesis | None:
+    """The single effect that fits best; None: none is worth its price, or the best cannot be."""
+    best = next(iter(hypotheses.singles(reduced, others)), None)
+    if best is None or best.score <= 0.0 or not hypotheses.can_be(reduced, best):
+        return None
+    return best
 
 
 def beside_shimmy(base: Base, single: Fitted) -> Iterator[tuple[tuple[Start, ...], Fitted]]:
@@ -81,8 +91,8 @@ def beside_shimmy(base: Base, single: Fitted) -> Iterator[tuple[tuple[Start, ...
     windows = calm(base.bench.simulator.windows, base.bench.windows)
     reduced = bounded.reduce(base.system, windows)
     others = [s for s in base.starts if s.effect.key != term.effect.key]
-    best = max(hypotheses.singles(reduced, others), key=lambda h: h.score, default=None)
-    if best is None or best.score <= 0.0 or not hypotheses.can_be(reduced, best):
+    best = _best_of(reduced, others)
+    if best is None:
         return
     begin = replace(single.variant, offsets={}, terms=(term, *hypotheses.terms(reduced, best)))
     shaken = frozenset(int(i) for i in base.bench.windows) - frozenset(windows)
