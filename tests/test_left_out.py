@@ -75,6 +75,27 @@ def test_an_effect_where_nothing_is_brings_nothing():
     assert gains([J] * 4, [[0.0]] * 4).mean() < 0.0
 
 
+@pytest.mark.parametrize(("second", "foretells"), [(30.0, True), (0.0, False)])
+def test_another_run_foretells_what_an_effect_does_and_no_event(monkeypatch, second, foretells):
+    """What an effect brings on a run, of what it does in the other (`second`)."""
+    rng = np.random.default_rng(3)
+    J = [unit(rng, 1) for _ in range(4)]
+    sizes = [0.0, 30.0, 0.0, second]  # of the runs' windows
+    made = system(J, [c[:, 0] * s for c, s in zip(J, sizes, strict=True)])
+    monkeypatch.setattr(left_out, "with_terms", lambda *_: (made, [0]))
+    runs = [SimpleNamespace(trial=SimpleNamespace(name=name)) for name in ("a", "b")]
+    bench = SimpleNamespace(
+        windows=np.arange(4),
+        windows_of=lambda mine: np.flatnonzero(np.isin(made.run, list(mine))),
+        simulator=SimpleNamespace(study=SimpleNamespace(runs=runs)),
+    )
+    base = SimpleNamespace(bench=bench, plain=SimpleNamespace(system=made))
+    brings = left_out.foretold_of(base, None, "a")
+    assert (brings > 0.5 * 30.0**2 / 2) == foretells
+    base.bench = SimpleNamespace(**{**vars(bench), "windows": np.arange(2)})
+    assert left_out.foretold_of(base, None, "a") == 0.0  # there is no other run
+
+
 def test_what_a_run_cannot_tell_it_does_not_foretell():
     """A push tells the sum of two numbers, a slalom their difference: together they tell both."""
     a, b = unit(np.random.default_rng(2), 2).T

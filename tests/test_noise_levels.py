@@ -109,6 +109,17 @@ def test_one_run_that_is_pushed_hard_does_not_raise_the_level_of_all():
     assert event[-1] < 2.5 * np.median(event[:-1])  # of the 20 times that an event made of it
 
 
+def test_a_run_that_stands_tells_nothing_of_what_shakes_one_that_rolls(plain):
+    """Beside a run that stood, what shakes coasts was taken for a third of what it is."""
+    drawn = windows(np.random.default_rng(1), shaken=0.0)
+    stand = [replace(w, stands=w.run == RUNS - 1) for w in drawn]
+    known, all_roll = (found(ws).parts[Part.DRIVE_FAST] for ws in (stand, drawn))
+    assert all_roll[-1] < 0.5 * known[-1]
+    np.testing.assert_allclose(known[-1], np.median(known), rtol=0.2)
+    none = found([replace(w, stands=True) for w in drawn]).parts[Part.DRIVE_FAST]
+    np.testing.assert_array_equal(none, KINDS[Part.DRIVE_FAST].first)
+
+
 def test_a_level_that_a_person_gave_stays():
     kept = found(windows(np.random.default_rng(1)), frozenset({Part.DRIVE_FAST}))
     np.testing.assert_array_equal(kept.parts[Part.DRIVE_FAST], KINDS[Part.DRIVE_FAST].first)

@@ -133,6 +133,19 @@ def test_what_held_out_trials_say(before, after, changed, holds):
     assert rules.carries_over(held) == holds
 
 
+def test_what_held_out_trials_speak_against_is_not_believed():
+    held = HeldOut(before=141.0, after=197.0, dof=160.0, changed=90.0)
+    assert rules.believed(0.55, held) == 0.0
+    assert rules.believed(0.55, replace(held, after=130.0)) == 0.55
+    assert rules.believed(0.55, None) == 0.55
+
+
+@pytest.mark.parametrize(("foretold", "once"), [(397.0, False), (100.0, True), (-500.0, True)])
+def test_what_other_runs_foretell_of_a_run_did_not_happen_once(foretold, once):
+    """Tires that slid in two swerves stood beside an event in one of them: 388 of chi2 to 296."""
+    assert rules.happened_once(event=388.0, gain=296.0, foretold=foretold) == once
+
+
 @pytest.mark.parametrize(
     ("before", "after", "changed", "again"),
     [

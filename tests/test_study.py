@@ -443,12 +443,16 @@ def test_a_clock_that_jumps_is_refused(tmp_path):
     fails(tmp_path, "clock jumps")
 
 
-def _rolled(damping_time):
-    """Columns of a coast uphill that stops, by tires that damp their rocking for so long (s)."""
+def _rolled(damping_time, speed=0.7):
+    """Columns of a coast uphill that stops, by tires that damp their rocking for so long (s).
+
+    Args:
+      speed: at first, m/s; 0: it stands from its first sample on.
+    """
     spec = mjchair.load_spec("manual", scene="ramp", grade=0.006)
     for wheel in ("left_wheel", "right_wheel"):
         parts.edit_tires(spec, block.ROLLING_DAMPING_TIME, lambda _: damping_time, (wheel,))
-    run = mjchair.simulate(spec, None, 10.0, initial={"speed": 0.7}, sample_rate=100.0)
+    run = mjchair.simulate(spec, None, 10.0, initial={"speed": speed}, sample_rate=100.0)
     names = ("left_wheel_speed", "right_wheel_speed")
     return run.time, {name: run[name] for name in names}
 
@@ -472,6 +476,33 @@ def test_how_a_chair_rocks_as_it_stops_is_in_no_window():
     kept = time[rows]
     assert kept.min() < 1.0 and kept.max() > 9.0  # the chair still stands: that it does is told
     assert not np.any((kept > first + 0.01) & (kept < after - 0.01))
+
+
+def test_how_a_model_settles_where_a_run_begins_with_a_stand_is_in_no_window():
+    """A chair let stand on a slope drew a right answer (81 %) to a bearing's friction (48 %)."""
+    (time, one), (_, other) = _rolled(0.25, speed=0.0), _rolled(0.6, speed=0.0)
+    (window,) = cut([_run(time, one)], 0.002)
+    apart = np.abs(one["left_wheel_speed"] - other["left_wheel_speed"])
+    assert apart.max() > 1e-3
+    assert apart[window.rows].max() < 0.25 * apart.max()
+    assert window.start == 0.0 and window.stands  # the simulation settles as the chair did
+    assert window.last - window.first == pytest.approx(8.0, abs=0.01)
+
+
+def test_a_chair_that_stands_before_it_rolls_settles_there():
+    """One window stands, and the first that rolls is simulated from the stand."""
+    time = np.arange(0.0, 10.0, 0.01)
+    speed = np.maximum(time - 5.0, 0.0)
+    stands, *rolls = cut([_run(time, {"left_wheel_speed": speed})], 0.002)
+    assert stands.stands and not any(w.stands for w in rolls)
+    assert (stands.start, stands.first) == (0.0, pytest.approx(2.0))
+    assert stands.last == rolls[0].first == pytest.approx(5.0, abs=0.15)
+    assert rolls[0].first - rolls[0].start == pytest.approx(standstill.ROCKS, abs=0.01)
+    assert rolls[1].first - rolls[1].start == pytest.approx(0.2)
+    late = time > 3.9  # too short a stand for a window of its own
+    first, *_ = cut([_run(time[late], {"left_wheel_speed": speed[late]})], 0.002)
+    assert first.start == time[late][0] and not first.stands
+    assert first.first == pytest.approx(5.0, abs=0.15)
 
 
 @pytest.mark.parametrize("kind", ["left angle", "angles", "places"])
@@ -567,11 +598,11 @@ def test_a_chair_that_turns_back_or_begins_at_rest_does_not_come_to_rest():
     time = np.arange(0.0, 8.0, 0.01)
     back = 2.0 - 0.8 * time
     starts = np.maximum(time - 3.0, 0.0)
-    for speed in (back, starts):
+    for speed, settled in ((back, 0.2), (starts, standstill.ROCKS)):
         run = _run(time, {"left_wheel_speed": speed, "right_wheel_speed": speed})
         assert standstill.rests(run.trial) == []
         rows = np.concatenate([w.rows for w in cut([run], 0.002)])
-        assert np.array_equal(rows, np.flatnonzero(time >= 0.2))
+        assert np.array_equal(rows, np.flatnonzero(time >= settled))
 
 
 def test_windows_are_short_where_a_caster_shimmies():

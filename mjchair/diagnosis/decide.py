@@ -22,6 +22,7 @@ from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Choice, closure
 from mjchair.diagnosis.explain.gap import Gap, forces_left
 from mjchair.diagnosis.explain.left_out import (
+    foretold_of,
     gap_foretold,
     held_out,
     held_out_gain,
@@ -94,6 +95,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     said = rules.verdict(gap.exists, stands)
     forces = missing_forces(base)
     likely = of_any(probability, _standing_keys(choice)) if choice else 0.0
+    likely = rules.believed(likely, stands.held_out if stands else None)
     answer = choice if said != Verdict.UNKNOWN or rules.is_likely(likely) else None
     size = material(base, gap, answer, sure_alone)
     foretold = gap_foretold(base)
@@ -238,8 +240,13 @@ def _standing_keys(choice: Choice) -> set[str]:
 
 def _once(base: Base, choice: Choice, held: rules.HeldOut | None) -> bool:
     """Whether something that happened once, in one run, fits about as well as the effects do."""
-    largest = event.largest(base).gain
-    return rules.happened_once(event=largest, gain=_beside_event(base, choice), held=held)
+    once = event.largest(base)
+    return rules.happened_once(
+        event=once.gain,
+        gain=_beside_event(base, choice),
+        held=held,
+        foretold=foretold_of(base, choice.fitted, once.trial),
+    )
 
 
 def _beside_event(base: Base, choice: Choice) -> float:

@@ -3,7 +3,8 @@
 In: runs. Out: windows of about two seconds, shorter in runs in which a caster shimmies. Over a
 whole run every small error adds up and everything becomes significant; over a second or two only
 forces show. A window is simulated from a little before it begins (the lead), so that what is fast
-in the chair has settled on the slow state when its first sample counts.
+in the chair has settled on the slow state when its first sample counts. A chair that stands rocks
+on its tires for far longer, so a stand has a longer lead, and is one window.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from mjchair.diagnosis.data import shimmy
 from mjchair.diagnosis.data.first_state import stops
-from mjchair.diagnosis.data.standstill import rests
+from mjchair.diagnosis.data.standstill import BEFORE, ROCKS, ROLLS, rests, still_stretches
 from mjchair.diagnosis.data.study import Run
 
 Array = NDArray[np.float64]
@@ -42,6 +43,7 @@ class Window:
       run: index of the run in the study. index: of the window in its run.
       start: where its simulation starts, s. first, last: where its samples count, s.
       rows: indices of the samples, in the run's time. shimmies: whether a caster does, there.
+      stands: whether the chair does, throughout.
     """
 
     run: int
@@ -51,29 +53,32 @@ class Window:
     last: float
     rows: NDArray[np.int64]
     shimmies: bool = False
+    stands: bool = False
 
 
 def cut(runs: Sequence[Run], step: float, length: float = LENGTH) -> list[Window]:
     """Cut every run into windows of about `length` (s), on a grid of simulation steps (s).
 
-    What a chair does as it comes to rest is in none of them (standstill.py).
+    What a chair does as it comes to rest is in none of them (standstill.py), nor is how a model
+    settles on its tires where a run begins with a stand.
     """
     windows: list[Window] = []
     for i, run in enumerate(runs):
         time, mine, shaken = run.trial.time, list[Window](), shimmy.stretches(run.trial)
-        for edges in _edges(run, step, _length(length, shaken)):
+        stands = [(float(time[a]), float(time[b - 1])) for a, b in still_stretches(run.trial)]
+        for edges in _edges(run, step, _length(length, shaken), stands):
             for begin, end in pairwise(edges):
                 at_start = begin == time[0]
                 there = any(s.begin < end and begin < s.end for s in shaken)
-                lead = BRIEF if there else LEAD
+                lead = max(BRIEF if there else LEAD, _stood(begin, step, stands))
                 first = begin + (lead if at_start else 0.0)
                 rows = np.flatnonzero((time >= first) & (time < end))
                 if rows.size < FEWEST:
                     continue
                 start = begin - (0.0 if at_start else lead)
-                mine.append(
-                    Window(i, len(mine), float(start), float(first), float(end), rows, there)
-                )
+                still = any(a <= begin and end - step <= b for a, b in stands)
+                place = (i, len(mine), float(start), float(first), float(end))
+                mine.append(Window(*place, rows, shimmies=there, stands=still))
         windows += mine
     return windows
 
@@ -103,13 +108,26 @@ def _length(usual: float, shaken: Sequence[shimmy.Stretch]) -> float:
     return min(usual, float(np.clip(SWINGS * swing, *SHORT)))
 
 
-def _edges(run: Run, step: float, length: float) -> list[Array]:
+def _stood(begin: float, step: float, stands: Sequence[tuple[float, float]]) -> float:
+    """How long the chair has stood as a window begins, s in steps, ROCKS at most."""
+    stood = next((begin - a for a, b in stands if a < begin <= b), 0.0)
+    return float(np.floor(min(stood, ROCKS) / step) * step)
+
+
+def _edges(
+    run: Run, step: float, length: float, stands: Sequence[tuple[float, float]]
+) -> list[Array]:
     """Edges (s) of the windows of every stretch of a run, between which it comes to rest."""
-    time = run.trial.time
-    begin, out = float(time[0]), []
-    for stop, onward in [*rests(run.trial), (stops(run) or float(time[-1]), np.inf)]:
-        count = max(1, round((stop - begin) / length))
-        inner = begin + np.round((stop - begin) * np.arange(1, count) / count / step) * step
-        out.append(np.r_[begin, inner, stop + step])
+    begin = zero = float(run.trial.time[0])
+    out = []
+    for stop, onward in [*rests(run.trial), (stops(run) or float(run.trial.time[-1]), np.inf)]:
+        stands_until = next((b - BEFORE for a, b in stands if a <= begin < b), begin)
+        leaves = min(stands_until, stop)
+        settled = min(begin + ROCKS, leaves) if begin == zero else begin
+        moves = leaves if leaves - settled > ROLLS else settled
+        settled, moves = (zero + round((at - zero) / step) * step for at in (settled, moves))
+        count = round((stop - moves) / length)
+        inner = moves + np.round((stop - moves) * np.arange(count) / max(count, 1) / step) * step
+        out.append(np.unique(np.r_[settled, inner, stop + step]))
         begin += np.ceil((onward - begin) / step) * step
     return out

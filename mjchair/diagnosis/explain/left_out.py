@@ -69,12 +69,18 @@ def held_out(
         parts = np.array([str(k % 2) for k in range(len(windows))])
     size = np.array([np.diag(full[0].G[i])[list(full[1])] for i in windows])
 
-    def gained(known: NDArray[np.int64]) -> float:
-        return _evidence(*plain, known) - _evidence(*full, known)
-
     # the density of all over that of the others is what the others predict of the left out
-    whole = gained(windows)
-    return sum(whole - gained(windows[~inside]) for inside in _left_out(parts, size))
+    whole = _gained(plain, full, windows)
+    return sum(whole - _gained(plain, full, windows[~inside]) for inside in _left_out(parts, size))
+
+
+def _gained(
+    plain: tuple[System, Sequence[int]],
+    full: tuple[System, Sequence[int]],
+    windows: NDArray[np.int64],
+) -> float:
+    """By how much windows are more probable with more columns, in chi2."""
+    return _evidence(*plain, windows) - _evidence(*full, windows)
 
 
 def _evidence(system: System, which: Sequence[int], windows: NDArray[np.int64]) -> float:
@@ -113,6 +119,24 @@ def with_terms(base: Base, fitted: Fitted) -> tuple[System, list[int]]:
 def held_out_gain(base: Base, fitted: Fitted, by: str = "run") -> float:
     """What a fit brings on the parts that it did not see, in chi2."""
     return held_out(base.bench, (base.plain.system, []), with_terms(base, fitted), by)
+
+
+def foretold_of(base: Base, fitted: Fitted, trial: str) -> float:
+    """What the effects bring on one run when they are fitted to the others, in chi2.
+
+    Where there are no others, 0.
+
+    Args:
+      trial: name of the run.
+    """
+    bench = base.bench
+    mine = {k for k, run in enumerate(bench.simulator.study.runs) if run.trial.name == trial}
+    others = np.setdiff1d(bench.windows, bench.windows_of(mine))
+    if not others.size:
+        return 0.0
+    full = with_terms(base, fitted)
+    whole, rest = (_gained((base.plain.system, []), full, w) for w in (bench.windows, others))
+    return whole - rest
 
 
 def on_held_out(base: Base, fitted: Fitted, fewer: Fitted | None = None) -> rules.HeldOut | None:

@@ -69,6 +69,7 @@ class WindowColumns:
       wobbles: channel -> (n, 2). band: (n,) index of each row's band. channel: (n,) place of its
         powers in `Levels.bands`.
       tells: (n,) whether a row tells its band's power.
+      stands: whether the chair does, which tells nothing of what shakes one that rolls.
     """
 
     run: int
@@ -81,6 +82,7 @@ class WindowColumns:
     band: NDArray[np.int64]
     channel: NDArray[np.int64]
     tells: NDArray[np.bool_]
+    stands: bool = False
 
 
 def windows_of(
@@ -125,6 +127,7 @@ def windows_of(
                 band=np.minimum(np.searchsorted(EDGES, frequency, side="right"), len(EDGES) - 1),
                 channel=whitener.channel[i] + (own if simulator.windows[i].shimmies else 0),
                 tells=frequency > LEAST_HZ,
+                stands=simulator.windows[i].stands,
             )
         )
     return out
@@ -246,13 +249,15 @@ def _looked_at(windows: Sequence[WindowColumns], levels: Levels) -> Seen:
         half = cho_solve(factor, columns.T)
         diagonal = 1.0 - np.einsum("ij,ji->i", columns, half) - np.einsum("ij,ij->i", lean, H)
         seen.add_rows(w, left**2, diagonal, levels.bands.size)
+        shaken = 0.0 if w.stands else 1.0
         for force, answers in w.pulses.items():
             P = answers * size[:, None]
             q, M = P.T @ left, _precision(P, columns, half, H, lean)
             for part, kind in KINDS.items():
                 if kind.force == force:
                     K = w.correlations[part]
-                    seen.add(part, w.run, runs, q @ K @ q, float((K * M).sum()))
+                    told = shaken * (q @ K @ q), shaken * float((K * M).sum())
+                    seen.add(part, w.run, runs, *told)
         for channel, pair in w.wobbles.items():
             P = pair * size[:, None]
             q, M = P.T @ left, _precision(P, columns, half, H, lean)
