@@ -179,3 +179,13 @@ def quantity(text: str, si: str, what: str) -> float:
     if unit not in units_of(si):
         raise MjchairError(f"{what} is {text!r}: its unit must be one of {', '.join(units_of(si))}")
     return float(match["number"]) * UNITS[unit][1]
+
+
+def with_error(value: float, std: float | None) -> str:
+    """A value with its standard deviation, to the digits that this allows; None: it has none."""
+    if std is None:
+        return f"{value:.4g}"
+    if not (0.0 < std < 1e4 and std > 1e-6):
+        return f"{value:.4g} ± {std:.2g}"
+    digits = max(0, 1 - math.floor(math.log10(std)))
+    return f"{value:.{digits}f} ± {std:.{digits}f}"

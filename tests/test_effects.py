@@ -273,6 +273,35 @@ def test_a_caster_creeps_in_proportion_below_its_friction_and_slides_above_it(mo
     assert swivel_rate(spec, 1.2 * moment) > 10.0 * moment / slope
 
 
+@pytest.mark.parametrize(
+    ("effect", "values", "std", "said"),
+    [
+        (
+            "floor_slope",
+            {"x": 0.00523, "y": -0.0021},
+            {"x": 8e-5, "y": 3e-4},
+            "the floor rises by 0.5230 ± 0.0080 % towards heading 0 "
+            "and 0.210 ± 0.030 % to its right",
+        ),
+        (
+            "floor_slope",
+            {"x": -0.01, "y": 0.0},
+            {},
+            "the floor rises by 1 % towards heading 180 deg",
+        ),
+        ("mass_offset", {"x": -0.04, "y": 0.0}, {"x": 0.005}, "40.0 ± 5.0 mm behind"),
+        (
+            "wind",
+            {"x": 0.0, "y": 3.0, "drag_area": 0.6},
+            {"y": 0.4, "drag_area": 0.1},
+            "it blows with 3.00 ± 0.40 m/s to its left, on a drag area of 0.60 ± 0.10 m^2",
+        ),
+    ],
+)
+def test_a_size_along_two_axes_says_which_way(effect, values, std, said):
+    assert find(effect).remark(values, std) == said
+
+
 @pytest.mark.parametrize(("side", "free"), [("left", "right"), ("right", "left")])
 def test_one_caster_holds_and_the_other_turns(side, free):
     spec = mjchair.load_spec()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from mjchair.effects import directions
 from mjchair.effects.effect import Effect, Parameter
 
 
@@ -26,5 +27,6 @@ EFFECT = Effect(
     source="floors called level are so within 0.5 % to 1 %",
     edit=edit,
     common=2.0,
+    remark=directions.remark(directions.WORLD, "%", 100.0, "the floor rises by"),
     by_hand="lay a digital level on the floor, along and across the track",
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from mjchair.effects import directions
 from mjchair.effects.effect import Effect, Parameter
 from mjchair.model import inertials
 
@@ -25,6 +26,7 @@ EFFECT = Effect(
     source="a seated person leans a few centimetres",
     edit=edit,
     example={"x": 0.05, "y": 0.02},
+    remark=directions.remark(directions.CHAIR, "mm", 1000.0),
     shared={"centre_x": ("x",), "centre_y": ("y",)},
     by_hand="weigh each caster and each rear wheel",
 )

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import mujoco
 import numpy as np
 
+from mjchair.effects import directions
 from mjchair.effects.air import add_air
 from mjchair.effects.effect import Effect, Parameter, Seed
+from mjchair.units import with_error
 
 DRAG_AREA = 0.6  # m^2, where a fit begins: slow runs tell drag area times speed squared alone
 # a wind along an axis has nothing across it, give or take: the sign of that is no matter
@@ -47,6 +51,14 @@ def _light_seed() -> Seed:
     return Seed(tuple({**p, "drag_area": DRAG_AREA} for p in points), combine, least=EITHER)
 
 
+_blows = directions.remark(directions.WORLD, "m/s", 1.0, "it blows with")
+
+
+def _words(values: Mapping[str, float], std: Mapping[str, float]) -> str:
+    area = with_error(values["drag_area"], std.get("drag_area", 0.0) or None)
+    return f"{_blows(values, std)}, on a drag area of {area} m^2"
+
+
 EFFECT = Effect(
     name="wind",
     parameters=(
@@ -59,6 +71,7 @@ EFFECT = Effect(
     edit=edit,
     common=0.1,
     outdoors=True,
+    remark=_words,
     by_hand="measure the wind on the track",
     example={"x": 2.0, "y": 2.0, "drag_area": DRAG_AREA},
     seeds=(*(_seed(a, b) for a in (1.0, -1.0) for b in (1.0, -1.0)), _light_seed()),

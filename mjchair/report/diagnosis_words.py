@@ -6,7 +6,6 @@ is typed, for the page to show; nothing here is HTML.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -27,7 +26,7 @@ from mjchair.diagnosis.result import (
     OneRun,
 )
 from mjchair.diagnosis.rules import LEVEL, LIKELY, PARTLY, PROBABLE, Verdict
-from mjchair.units import per_cent, probable, with_unit
+from mjchair.units import per_cent, probable, with_error, with_unit
 
 LEAST = 1e-6  # a chance below this is said to be below it
 # what a force may go with that is not known where nothing tells how the chair turns
@@ -635,16 +634,6 @@ def _parameters(effect: NamedEffect) -> Iterable[str]:
 def open_upwards(p: Estimate) -> str:
     """The least size of a number that may be far larger; empty: it is no such number."""
     return "" if p.at_least is None else f"at least {p.at_least:.2g}"
-
-
-def with_error(value: float, std: float | None) -> str:
-    """A value with its standard deviation, to the digits that this allows; None: it has none."""
-    if std is None:
-        return f"{value:.4g}"
-    if not (0.0 < std < 1e4 and std > 1e-6):
-        return f"{value:.4g} ± {std:.2g}"
-    digits = max(0, 1 - math.floor(math.log10(std)))
-    return f"{value:.{digits}f} ± {std:.{digits}f}"
 
 
 def roughly_known(name: str) -> str:
