@@ -27,6 +27,7 @@ from mjchair.diagnosis.result import (
     ForceLevels,
     ForceSamples,
     GapSummary,
+    Material,
     MissingForce,
     Moved,
     NamedEffect,
@@ -644,6 +645,28 @@ def test_what_is_left_goes_with_what_was_measured():
     assert "goes with heading" in words.remainder_words(found)
     found.evidence = dataclasses.replace(found.evidence, turns=False)
     assert "goes with stroke" in words.remainder_words(found)
+
+
+@pytest.mark.parametrize(
+    ("probability", "said"),
+    [
+        ({"outside": 0.9, "none": 0.1}, "no effect of the library explains"),
+        ({"toe": 0.8, "outside": 0.2}, "Of the library toe is the most probable"),
+    ],
+)
+def test_what_nothing_explains_names_what_is_most_probable(probability, said):
+    """82 % stood on an effect, of which the first sentence said that no effect explains it."""
+    assert said in words.missing(Diagnosis(verdict=Verdict.UNKNOWN, probability=probability))
+
+
+@pytest.mark.parametrize(
+    ("held", "before", "said"), [(True, 1.42, True), (True, 0.9, False), (False, 1.42, False)]
+)
+def test_none_says_what_held_out_runs_leave(held, before, said):
+    scope = "held-out trials" if held else "trials"
+    gap = GapSummary(before=before, after=None, scope=scope, p_value=1e-6, p_value_after=None)
+    found = Diagnosis(verdict=Verdict.NONE, gap=gap, material=Material(3.0, 1.2))
+    assert ("1.4 times the noise in those held out" in words.missing(found)) == said
 
 
 def test_mean_forces_are_not_drawn_towards_zero():

@@ -341,7 +341,7 @@ def test_what_is_below_the_limit_does_not_matter(changes, matters):
 
 def test_the_words_of_none_that_matters_fit_the_force():
     """A force above the limit is not said to be below it."""
-    gap = SimpleNamespace(p_value=1e-6)
+    gap = SimpleNamespace(p_value=1e-6, held_out=False)
     small, large = (SimpleNamespace(value=v, limit=1.2) for v in (0.4, 3.7))
     below, above = (
         nothing_missing(SimpleNamespace(gap=gap, material=m, next_experiment=""))

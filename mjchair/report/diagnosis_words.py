@@ -21,6 +21,7 @@ from mjchair.diagnosis.result import (
     Diagnosis,
     Disagreement,
     Estimate,
+    GapSummary,
     MissingForce,
     NamedEffect,
     OneRun,
@@ -34,6 +35,7 @@ TURNING = (Quantity.YAW_RATE, Quantity.HEADING, Quantity.SWIVEL, Quantity.RIGHT_
 TURNS = {"wheel_turn": str(Part.WHEEL_TURN), "caster_turn": str(Part.CASTER_TURN)}
 CLEAR = 0.5  # of what shakes the chair forward: a force once a turn of this size is told
 NOTABLE = 1.5  # times the noise: where a correction leaves more, what can explain it is said
+NOTED = 1.2  # times the noise: where held-out runs leave more, and nothing is missing, it is said
 A_GAP = 0.8  # of what a correction leaves: where no more than this is a gap, the rest is explained
 STAYS = 0.95  # of a gap on held-out runs: a correction that leaves more does not change it
 ALL = 0.995  # of a gap: more is not told as 100 %
@@ -71,7 +73,19 @@ def missing(diagnosis: Diagnosis) -> str:
             "shows that the real one did: what keeps it down is in no model, such as a person who "
             "leans forward."
         )
-    return "A force is missing that no effect of the library explains, so none is named."
+    return _unexplained(diagnosis)
+
+
+def _unexplained(diagnosis: Diagnosis) -> str:
+    """That nothing is named, though one effect of the library may be the most probable."""
+    first = next(iter(explanations(diagnosis)), None)
+    if first is None or first.name in (NONE, OUTSIDE, ONE_RUN):
+        return "A force is missing that no effect of the library explains, so none is named."
+    return (
+        f"Something is missing. Of the library {hypothesis_words(first.name)} is the most "
+        "probable, but it explains too little of these runs, or not all of them, so nothing is "
+        "named."
+    )
 
 
 def one_run_words(one: OneRun) -> str:
@@ -228,12 +242,19 @@ def nothing_missing(diagnosis: Diagnosis) -> str:
     if material.value >= material.limit:
         return (
             f"Nothing that matters{far}: single tests stand out that no effect explains, but all "
-            "that is left together is no more than noise."
+            f"that is left together is no more than noise{_held_out_left(gap)}."
         )
     return (
         f"Nothing that matters{far}: more than noise is left, but no missing force is larger than "
         f"{material.value:.2g} N, and below {material.limit:.2g} N none matters, whatever makes it."
     )
+
+
+def _held_out_left(gap: GapSummary) -> str:
+    """What the chair leaves on held-out runs, where that is more than in those of the fit."""
+    if not gap.held_out or gap.before < NOTED:
+        return ""
+    return f" in the runs of the fit ({size(gap.before)} times the noise in those held out)"
 
 
 def turn_words(diagnosis: Diagnosis) -> str:
