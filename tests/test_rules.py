@@ -135,9 +135,12 @@ def test_what_held_out_trials_say(before, after, changed, holds):
 
 def test_what_held_out_trials_speak_against_is_not_believed():
     held = HeldOut(before=141.0, after=197.0, dof=160.0, changed=90.0)
-    assert rules.believed(0.55, held) == 0.0
-    assert rules.believed(0.55, replace(held, after=130.0)) == 0.55
-    assert rules.believed(0.55, None) == 0.55
+    against, fine = (replace(CLEAR, held_out=replace(held, after=a)) for a in (197.0, 130.0))
+    assert rules.believed(0.55, against) == 0.0
+    assert rules.believed(0.55, fine) == 0.55
+    assert rules.believed(0.55, replace(fine, gain_by_run=-67.0)) == 0.0
+    assert rules.believed(0.55, replace(CLEAR, held_out=None)) == 0.55
+    assert rules.believed(0.55, None) == 0.0
 
 
 @pytest.mark.parametrize(("foretold", "once"), [(397.0, False), (100.0, True), (-500.0, True)])

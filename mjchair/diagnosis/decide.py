@@ -94,8 +94,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         )
     said = rules.verdict(gap.exists, stands)
     forces = missing_forces(base)
-    likely = of_any(probability, _standing_keys(choice)) if choice else 0.0
-    likely = rules.believed(likely, stands.held_out if stands else None)
+    likely = rules.believed(of_any(probability, _standing_keys(choice)) if choice else 0.0, stands)
     answer = choice if said != Verdict.UNKNOWN or rules.is_likely(likely) else None
     size = material(base, gap, answer, sure_alone)
     foretold = gap_foretold(base)
