@@ -41,22 +41,40 @@ def test_nearer_walls_leave_more_to_the_effects():
         assert wide.narrowed(bounded.WALL).total == pytest.approx(wide.total, rel=1e-9)
 
 
+def least_chi2(seed, which, held=None):
+    """Of a system with columns `which`, by other means; `held`: a nuisance at its centre."""
+    system, rows, residual = made(seed)
+    use = [*range(NUISANCES), *which]
+    prior = np.eye(NUISANCES, len(use))
+    wall = np.full(len(use), np.inf)
+    wall[:NUISANCES] = bounded.WALL
+    if held is not None:
+        wall[held] = 1e-5
+    centre = np.r_[system.back, np.zeros(len(which))]
+    best = lsq_linear(
+        np.vstack([rows[:, use], prior]),
+        np.r_[residual, -system.back],
+        (-wall - centre, wall - centre),
+        method="trf",
+        tol=1e-12,
+    )
+    return 2.0 * best.cost
+
+
 @pytest.mark.parametrize("which", [[], [NUISANCES], [NUISANCES, NUISANCES + 1]])
 def test_walls_end_at_the_least_chi2(which):
     for seed in range(40):
-        system, rows, residual = made(seed)
+        system, _, _ = made(seed)
         steps, total = bounded.solve(system, [0], which)
-        use = [*range(NUISANCES), *which]
-        prior = np.eye(NUISANCES, len(use))
-        wall = np.full(len(use), np.inf)
-        wall[:NUISANCES] = bounded.WALL
-        centre = np.r_[system.back, np.zeros(len(which))]
-        best = lsq_linear(
-            np.vstack([rows[:, use], prior]),
-            np.r_[residual, -system.back],
-            (-wall - centre, wall - centre),
-            method="trf",
-            tol=1e-12,
-        )
-        assert total == pytest.approx(2.0 * best.cost, rel=1e-4)
+        assert total == pytest.approx(least_chi2(seed, which), rel=1e-4)
         assert np.abs(steps[:NUISANCES] + system.back).max() < bounded.WALL + 1e-6
+
+
+def test_what_is_held_where_the_study_has_it_costs_what_the_rest_cannot_make_up_for():
+    which = [NUISANCES]
+    for seed in range(10):
+        system, _, _ = made(seed)
+        cost = bounded.cost_of_holding(system, [0], which, {RoughlyKnown("n3")})
+        free, held = least_chi2(seed, which), least_chi2(seed, which, held=3)
+        assert cost == pytest.approx(held - free, abs=1e-4 * held)
+        assert cost > -1e-6

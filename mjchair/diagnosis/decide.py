@@ -31,6 +31,7 @@ from mjchair.diagnosis.explain.left_out import (
     on_held_out,
     over_noise,
     slow_part,
+    with_terms,
 )
 from mjchair.diagnosis.explain.one_run import InOneRun, in_one_run
 from mjchair.diagnosis.explain.probability import (
@@ -45,7 +46,7 @@ from mjchair.diagnosis.explain.rivals import exchanged, with_probable, with_spok
 from mjchair.diagnosis.explain.run_by_run import uneven
 from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit import bounded
-from mjchair.diagnosis.fit.column_ids import ParameterId
+from mjchair.diagnosis.fit.column_ids import ParameterId, RoughlyKnown
 from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.process import NAMED, level
 from mjchair.diagnosis.fit.slow_part import BAND
@@ -187,6 +188,19 @@ def _walls(fitted: Fitted) -> int:
     return len(bounded.at_walls(fitted.variant.offsets))
 
 
+def _walls_that_count(base: Base, choice: Choice) -> int:
+    """How many of them stand where what pushes them may be all that is missing."""
+    fitted, least = choice.fitted, min(choice.own_gains, default=0.0)
+    system, which = with_terms(base, fitted)
+    return sum(
+        rules.may_be_all(
+            cost=bounded.cost_of_holding(system, base.bench.windows, which, {RoughlyKnown(name)}),
+            gain=least,
+        )
+        for name in bounded.at_walls(fitted.variant.offsets)
+    )
+
+
 def _nearest(base: Base, choice: Choice, closed: float) -> Nearest:
     """The explanation that is not named, with what it leaves."""
     return Nearest(
@@ -214,7 +228,7 @@ def standing(
         once=_once(base, choice, held),
         runs=len(base.bench.simulator.study.fitted),
         held_out=held,
-        walls=_walls(fitted),
+        walls=_walls_that_count(base, choice),
     )
 
 

@@ -144,8 +144,8 @@ class Standing:
       once: whether something that happened once fits as well.
       runs: that were fitted to.
       held_out: the trials that no fit saw; None where there are none.
-      walls: how many numbers that are only roughly known stand on their walls with the effects in:
-        they are where what is missing pushed them.
+      walls: how many numbers that are only roughly known stand on their walls with the effects in,
+        as `may_be_all` says: they are where what is missing pushed them.
       uneven: whether an effect is not of one size in all runs.
       one_run: whether another, in one run alone, explains more. one_alike: or about as much.
     """
@@ -692,6 +692,19 @@ def reach_of_whole(*, best: float, gain: float) -> float:
 def not_ruled_out(*, gain: float) -> float:
     """Chi2 by which a fit may be worse and yet as good as another that brings `gain`."""
     return max(RIVAL_CHI2, FORM * gain)
+
+
+def may_be_all(*, cost: float, gain: float) -> bool:
+    """Whether what pushes a roughly known number to its wall may be all that is missing.
+
+    Tires that slid brought 1 215 889, and left a stiffness of the rear tires on its wall, which
+    brought 1221: as much as the form of an effect leaves.
+
+    Args:
+      cost: chi2 that is lost where the number stands where the study has it. gain: that an effect
+        brings which was found.
+    """
+    return cost > FORM * gain
 
 
 def counts(by: float, *, gain: float) -> float:

@@ -9,7 +9,7 @@ it. What is left (`Reduced`) weighs effects by small linear algebra alone.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from weakref import WeakKeyDictionary
@@ -28,6 +28,7 @@ Active = tuple[tuple[int, float], ...]
 # prior standard deviations beyond which no nuisance is believed: without a wall a centre of mass
 # 22 mm aside passes for a nuisance of 2 mm, at the price of a chi2 that no rival must pay
 WALL = 3.0
+AT_CENTRE = 1e-6  # standard deviations: a wall as near holds a nuisance where the study has it
 SETTLE = 12  # rounds of finding which nuisances stand on their walls
 
 
@@ -213,6 +214,22 @@ def at_walls(offsets: Mapping[str, float]) -> list[str]:
       offsets: name -> by how many standard deviations it was moved.
     """
     return [name for name, by in offsets.items() if abs(by) > WALL - 1e-6]
+
+
+def cost_of_holding(
+    system: System, windows: Windows, which: Sequence[int], known: Collection[ColumnId]
+) -> float:
+    """Chi2 that is lost where nuisances stand where the study has them, all else fitted anew.
+
+    Args:
+      which: places among all columns, none of a nuisance. known: the nuisances.
+    """
+    places = [i - system.nuisance for i in which]
+    free = reduce(system, windows)
+    held = np.array([c in known for c in system.columns[: system.nuisance]])
+    wall = np.where(held, AT_CENTRE, free.sums.wall)
+    kept = replace(free.sums, wall=wall, known={}).plain()
+    return kept.step(places)[1] - free.step(places)[1]
 
 
 def scaled_solve(G: Array, b: Array) -> Array:
