@@ -281,7 +281,7 @@ def test_a_caster_creeps_in_proportion_below_its_friction_and_slides_above_it(mo
             {"x": 0.00523, "y": -0.0021},
             {"x": 8e-5, "y": 3e-4},
             "the floor rises by 0.5230 ± 0.0080 % towards heading 0 "
-            "and 0.210 ± 0.030 % to its right",
+            "and 0.210 ± 0.030 % towards heading 270 deg",
         ),
         (
             "floor_slope",
@@ -294,7 +294,8 @@ def test_a_caster_creeps_in_proportion_below_its_friction_and_slides_above_it(mo
             "wind",
             {"x": 0.0, "y": 3.0, "drag_area": 0.6},
             {"y": 0.4, "drag_area": 0.1},
-            "it blows with 3.00 ± 0.40 m/s to its left, on a drag area of 0.60 ± 0.10 m^2",
+            "it blows with 3.00 ± 0.40 m/s towards heading 90 deg, "
+            "on a drag area of 0.60 ± 0.10 m^2",
         ),
     ],
 )

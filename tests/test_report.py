@@ -364,7 +364,7 @@ def test_rivals_are_in_the_first_sentence():
     sets = [["floor_slope", "rolling_resistance"]]
     said = words.missing(Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets))
     assert said == (
-        "What is missing is **floor slope** or **rolling resistance**, and these runs cannot tell "
+        "It is **floor slope** or **rolling resistance**, and these runs cannot tell "
         "which. The corrected chair has **rolling resistance** (coefficient 0.01460 ± 0.00040)."
     )
 
@@ -429,7 +429,7 @@ def test_what_is_in_every_explanation_is_said_before_what_is_open():
     assert words.settled(found) == [BIAS]
     said = words.missing(found)
     assert said.startswith("The sensor of imu_gyro.z shows 0.1")
-    assert ". Besides, what is missing is **rolling resistance** or **toe**, and these" in said
+    assert ". Besides, it is **rolling resistance** or **toe**, and these" in said
     assert said.endswith(
         "The corrected chair has **rolling resistance** (coefficient 0.01460 ± 0.00040)."
     )

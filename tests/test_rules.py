@@ -379,9 +379,9 @@ def test_nothing_is_missing_only_if_the_chair_is_where_the_fit_moved_it():
         for n in ("", "Measure the mass.")
     )
     assert nothing_missing(plain).startswith("Nothing: ")
-    assert nothing_missing(far).startswith("Nothing, if the chair is as far ")
+    assert nothing_missing(far).startswith("Nothing, if chair and sensors are as far ")
     far.gap, far.material = SimpleNamespace(p_value=1e-6), SimpleNamespace(value=0.4, limit=1.2)
-    assert nothing_missing(far).startswith("Nothing that matters, if the chair is as far ")
+    assert nothing_missing(far).startswith("Nothing that matters, if chair and sensors are as far ")
 
 
 def test_an_event_stands_beside_an_effect_that_brings_little_more():

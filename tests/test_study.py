@@ -505,6 +505,19 @@ def test_a_chair_that_stands_before_it_rolls_settles_there():
     assert first.first == pytest.approx(5.0, abs=0.15)
 
 
+def test_what_a_late_torque_does_at_the_end_of_a_run_is_in_no_window():
+    """Torques 50 ms late came as a rider who moves and two early sensors: in the last 50 ms of a
+    run the torque that acts is recorded after its end."""
+    time = np.arange(0.0, 6.0, 0.01)
+    run = _run(time, {"left_wheel_speed": 1.0 + time})
+    driven = replace(run, trial=replace(run.trial, inputs=Inputs(time, {"left_wheel": time})))
+    ends = [
+        cut([r], 0.002, measured=m)[-1].last
+        for r, m in ((driven, True), (driven, False), (run, True))
+    ]
+    assert ends == pytest.approx([5.792, 5.992, 5.992])
+
+
 @pytest.mark.parametrize("kind", ["left angle", "angles", "places"])
 def test_angles_and_places_tell_as_well_as_speeds_when_a_chair_stops(kind):
     """A coast whose wheels had angles alone was fitted through its stop: chi2 of 400 a window."""

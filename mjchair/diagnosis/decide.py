@@ -361,8 +361,10 @@ def _following(
     if said == Verdict.NAMED:
         return ""
     answered = choice if said == Verdict.AMBIGUOUS else None
-    known = (answered.fitted if answered else base.plain).variant.known_roughly
-    return wording.measuring([(n, by) for n, by in known if rules.is_far(by)])
+    fitted = answered.fitted if answered else base.plain
+    known = [(n, by) for n, by in fitted.variant.known_roughly if rules.is_far(by)]
+    known += [(n, by) for n, by in notes.far_gains(fitted) if rules.is_far(by)]
+    return wording.measuring(known)
 
 
 def _alternatives(choice: Choice, once: bool, alone: InOneRun | None) -> list[list[str]]:

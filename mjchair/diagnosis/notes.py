@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from mjchair.diagnosis import rules
+from mjchair.diagnosis.data.roughly_known import Nuisance
 from mjchair.diagnosis.explain import event, noise_shown
 from mjchair.diagnosis.explain.choice import Choice
 from mjchair.diagnosis.explain.column_ids import Quantity
@@ -147,14 +148,18 @@ def _of_tipping(bench: Bench) -> Iterator[str]:
 
 def _of_gains(fitted: Fitted) -> list[str]:
     """A note on each sensor whose gain is far from one, for which its prior may stand in doubt."""
-    moved = [(n, by) for n, by in fitted.moved if n.channel and n.error is SensorError.SCALE]
     return [
         f"{n.channel} shows {100.0 * n.std * abs(by):.2g} % too {'much' if by > 0.0 else 'little'} "
         f"by these runs, {abs(by):.1f} standard deviations of what its gain is known to: calibrate "
         f'it, or give "{n.name}" in [nuisance] where it is known better'
-        for n, by in moved
-        if abs(by) >= FAR_GAIN
+        for n, by in far_gains(fitted)
     ]
+
+
+def far_gains(fitted: Fitted) -> list[tuple[Nuisance, float]]:
+    """The gains of sensors that are far from one, with the standard deviations by which."""
+    moved = [(n, by) for n, by in fitted.moved if n.channel and n.error is SensorError.SCALE]
+    return [(n, by) for n, by in moved if abs(by) >= FAR_GAIN]
 
 
 def no_answer(choice: Choice, stands: rules.Standing) -> str:

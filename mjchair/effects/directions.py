@@ -1,7 +1,7 @@
 """Words for a size with two components: how large, and which way.
 
 In: the values of an effect with the parameters `x` and `y`, and their standard errors. Out: words.
-Along the world's axes x is heading 0 and y is to the left of it; along the chair's, ahead and to
+Along the world's axes x is heading 0 and y is heading 90 degrees; along the chair's, ahead and to
 its left.
 """
 
@@ -14,7 +14,7 @@ from mjchair.units import with_error
 Remark = Callable[[Mapping[str, float], Mapping[str, float]], str]
 WORLD = {
     "x": ("towards heading 0", "towards heading 180 deg"),
-    "y": ("to its left", "to its right"),
+    "y": ("towards heading 90 deg", "towards heading 270 deg"),
 }
 CHAIR = {"x": ("ahead", "behind"), "y": ("to the left", "to the right")}
 

@@ -79,7 +79,12 @@ def missing(diagnosis: Diagnosis) -> str:
 def _unexplained(diagnosis: Diagnosis) -> str:
     """That nothing is named, though one effect of the library may be the most probable."""
     first = next(iter(explanations(diagnosis)), None)
-    if first is None or first.name in (NONE, OUTSIDE, ONE_RUN):
+    if first is not None and first.name == NONE:
+        return (
+            "A held-out run shows what no run of the fit does, or a test stands out that nothing "
+            "explains, so nothing is named."
+        )
+    if first is None or first.name in (OUTSIDE, ONE_RUN):
         return "A force is missing that no effect of the library explains, so none is named."
     return (
         f"Something is missing. Of the library {hypothesis_words(first.name)} is the most "
@@ -104,7 +109,7 @@ def _undecided(diagnosis: Diagnosis) -> str:
     if not diagnosis.alternatives:
         if likely >= LIKELY:
             what = found_words(every)
-            return f"Probably ({share(likely)}), {what}; these runs are not enough to name it."
+            return f"Probably ({probable(likely)}), {what}; these runs are not enough to name it."
         return f"Perhaps {found_words(every)}, but the evidence is thin."
     known = settled(diagnosis)
     others = [e for e in every if e not in known]
@@ -125,7 +130,7 @@ def _open(diagnosis: Diagnosis, effects: Sequence[NamedEffect]) -> str:
         return f"{chair} But these runs cannot tell {_from(sets)}."
     ((own, others),) = sets.items()
     any_of = _one_of(own, *others)
-    return f"what is missing is {any_of}, and these runs cannot tell which. {_capital(chair)}"
+    return f"it is {any_of}, and these runs cannot tell which. {_capital(chair)}"
 
 
 def _from(sets: Mapping[str, Sequence[str]]) -> str:
@@ -235,7 +240,7 @@ def settled(diagnosis: Diagnosis) -> list[NamedEffect]:
 def nothing_missing(diagnosis: Diagnosis) -> str:
     """That nothing is missing, or nothing that matters, with the number."""
     gap, material = diagnosis.gap, diagnosis.material
-    far = ", if the chair is as far from that of the study as these runs put it"
+    far = ", if chair and sensors are as far from what the study says as these runs put them"
     far = far if diagnosis.next_experiment else ""
     if gap is None or gap.p_value >= LEVEL or material is None:
         return f"Nothing{far}: the chair explains these runs as well as the noise in them allows."

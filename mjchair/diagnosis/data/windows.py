@@ -33,6 +33,8 @@ LEAD = 0.2  # s
 # settle, and over 0.2 s it gets out of step
 BRIEF = 0.06
 FEWEST = 5  # samples of a window
+# s, by which torques may have been recorded late: what acts at the end of a run comes after it
+LATE = 0.2
 
 
 @dataclass(frozen=True)
@@ -56,17 +58,24 @@ class Window:
     stands: bool = False
 
 
-def cut(runs: Sequence[Run], step: float, length: float = LENGTH) -> list[Window]:
+def cut(
+    runs: Sequence[Run], step: float, length: float = LENGTH, measured: bool = False
+) -> list[Window]:
     """Cut every run into windows of about `length` (s), on a grid of simulation steps (s).
 
     What a chair does as it comes to rest is in none of them (standstill.py), nor is how a model
-    settles on its tires where a run begins with a stand.
+    settles on its tires where a run begins with a stand. Torques that were measured may have been
+    recorded late, so a run of them ends so much earlier.
+
+    Args:
+      measured: whether the torques that drive runs were.
     """
     windows: list[Window] = []
     for i, run in enumerate(runs):
         time, mine, shaken = run.trial.time, list[Window](), shimmy.stretches(run.trial)
         stands = [(float(time[a]), float(time[b - 1])) for a, b in still_stretches(run.trial)]
-        for edges in _edges(run, step, _length(length, shaken), stands):
+        end = float(time[-1]) - (LATE if measured and run.trial.inputs is not None else 0.0)
+        for edges in _edges(run, step, _length(length, shaken), stands, end):
             for begin, end in pairwise(edges):
                 at_start = begin == time[0]
                 there = any(s.begin < end and begin < s.end for s in shaken)
@@ -115,12 +124,19 @@ def _stood(begin: float, step: float, stands: Sequence[tuple[float, float]]) -> 
 
 
 def _edges(
-    run: Run, step: float, length: float, stands: Sequence[tuple[float, float]]
+    run: Run, step: float, length: float, stands: Sequence[tuple[float, float]], end: float
 ) -> list[Array]:
-    """Edges (s) of the windows of every stretch of a run, between which it comes to rest."""
+    """Edges (s) of the windows of every stretch of a run, between which it comes to rest.
+
+    Args:
+      end: s, after which no sample counts.
+    """
     begin = zero = float(run.trial.time[0])
     out = []
-    for stop, onward in [*rests(run.trial), (stops(run) or float(run.trial.time[-1]), np.inf)]:
+    for rest, onward in [*rests(run.trial), (stops(run) or end, np.inf)]:
+        stop = min(rest, end)
+        if stop < begin:
+            break
         stands_until = next((b - BEFORE for a, b in stands if a <= begin < b), begin)
         leaves = min(stands_until, stop)
         settled = min(begin + ROCKS, leaves) if begin == zero else begin

@@ -136,13 +136,18 @@ def measuring(moved: Sequence[tuple[Nuisance, float]]) -> str:
       moved: what is only roughly known, and by how many of its standard deviations it was moved,
         of those that are far; empty where none is.
     """
-    said = [f"{measured(n.name)}: {changed(n, by)}, {abs(by):.1f} sigmas" for n, by in moved]
+    said = [f"{_numbered(n)}: {changed(n, by)}, {abs(by):.1f} sigmas" for n, by in moved]
     if not said:
         return ""
     return (
-        f"Measure what these runs put far from the chair of the study: {'; '.join(said)}. If it is "
-        "as in that chair, something else is missing."
+        f"Measure what these runs put far from what the study says: {'; '.join(said)}. If it is "
+        "as the study says, something else is missing."
     )
+
+
+def _numbered(number: Nuisance) -> str:
+    """A number that is only roughly known as words; of a sensor, its gain."""
+    return f"the gain of {number.channel}" if number.channel else measured(number.name)
 
 
 WHEEL = (

@@ -116,7 +116,8 @@ class WindowSimulator:
         self.base = self.spec.copy().compile()
         self.chair = Chair(self.base)
         self.step = float(self.base.opt.timestep)
-        self.windows = list(windows) if windows is not None else cut(study.runs, self.step)
+        whole = cut(study.runs, self.step, measured=study.driven_as_measured)
+        self.windows = whole if windows is None else list(windows)
         self.rolls = self._rolling()
         self.coarse = self._coarse_step()
         self._places: dict[int, list[int]] = {}
