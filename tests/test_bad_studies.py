@@ -189,6 +189,15 @@ CASES = {
         },
         "imu_accelerometer.x looks like g: the wheels gain 9.. times",
     ),
+    "acceleration of gentle strokes in g": (
+        {
+            "columns": {
+                "left_wheel_speed": (1.0 + 0.05 * PUSH) / 0.3,
+                "imu_accelerometer.x": 0.05 * PULL / 9.81,
+            }
+        },
+        "imu_accelerometer.x looks like g: the wheels gain 9.. times",
+    ),
     "acceleration of the other sign": (
         {"columns": {"left_wheel_speed": PUSH / 0.3, "imu_accelerometer.x": -PULL}},
         "imu_accelerometer.x falls where left_wheel_speed rises: x is forward, so turn its sign",

@@ -29,6 +29,7 @@ from mjchair.diagnosis.result import (
     GapSummary,
     Material,
     MissingForce,
+    Moment,
     Moved,
     NamedEffect,
     Nearest,
@@ -657,6 +658,15 @@ def test_what_is_left_goes_with_what_was_measured():
 def test_what_nothing_explains_names_what_is_most_probable(probability, said):
     """82 % stood on an effect, of which the first sentence said that no effect explains it."""
     assert said in words.missing(Diagnosis(verdict=Verdict.UNKNOWN, probability=probability))
+
+
+def test_what_happened_in_one_run_is_said_first():
+    """A knock that the next step told stood under a force that no effect explains."""
+    found = Diagnosis(verdict=Verdict.UNKNOWN, moment=Moment(trial="run2", begin=2, end=4))
+    assert words.missing(found).startswith("Something happened in run2 between 2 and 4 s")
+    held = Diagnosis(verdict=Verdict.UNKNOWN, moment=Moment(trial="run5"))
+    assert words.missing(held).startswith("Something happened in run5, which is held out")
+    assert held.to_dict()["moment"] == {"trial": "run5", "begin": None, "end": None}
 
 
 @pytest.mark.parametrize(

@@ -60,6 +60,7 @@ from mjchair.diagnosis.result import (
     Estimate,
     GapSummary,
     MissingForce,
+    Moment,
     NamedEffect,
     Nearest,
     OneRun,
@@ -128,6 +129,8 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     once = bool(stands and stands.once)
     sets = _alternatives(undecided, once, alone) if undecided else []
     pushed = bool(stands and stands.walls and not sets)  # to be measured, and not separated
+    unexplained = said == Verdict.UNKNOWN and alone is None and not base.bench.tipped
+    moment, look = _moment(base, gap, choice) if unexplained else (None, "")
     plan, unplanned = _plan(base, undecided, once) if undecided and not pushed else (None, [])
     return Diagnosis(
         verdict=said,
@@ -136,7 +139,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         candidates=_candidates(base, gap, choice),
         gap=_summary(base, gap, named, over_noise(held.after, held.dof) if held else foretold),
         where=_where(base),
-        next_experiment=_following(base, gap, choice, said, plan, left, alone),
+        next_experiment=look or _following(base, gap, choice, said, plan, left, alone),
         notes=[
             *notes.notes_on(base, gap, choice, stands, said=said, left=left, alone=alone),
             *(notes.of_uneven(d) for d in differing if named),
@@ -145,6 +148,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         drivers=left,
         nearest=_nearest(base, choice, closed) if choice and said == Verdict.UNKNOWN else None,
         one_run=_in_one_run(alone, gap) if alone else None,
+        moment=moment,
         tipped=_tipped(base),
         probability=probability,
         more_missing=bool(named and stands and rules.more_missing(stands)),
@@ -350,12 +354,6 @@ def _following(
     if said == Verdict.UNKNOWN and base.bench.tipped:
         return wording.keeping_down()
     if said == Verdict.UNKNOWN:
-        lone = lone_run(base, choice.fitted if choice else base.plain)
-        if lone is not None:
-            return wording.letting_in(*lone)
-        once = event.explaining(base, gap)
-        if once is not None and not once.whole:
-            return wording.looking_at(once.trial, once.begin, once.end)
         drivers = [(force.goes_with, force.sigmas) for force in left]
         return wording.searching(drivers, event.pushed(base.bench.simulator))
     if said == Verdict.NAMED:
@@ -365,6 +363,18 @@ def _following(
     known = [(n, by) for n, by in fitted.variant.known_roughly if rules.is_far(by)]
     known += [(n, by) for n, by in notes.far_gains(fitted) if rules.is_far(by)]
     return wording.measuring(known)
+
+
+def _moment(base: Base, gap: Gap, choice: Choice | None) -> tuple[Moment | None, str]:
+    """Where something happened that no other run shows, if so, and what to do about it."""
+    lone = lone_run(base, choice.fitted if choice else base.plain)
+    if lone is not None:
+        return Moment(trial=lone.run), wording.letting_in(*lone)
+    once = event.explaining(base, gap)
+    if once is None or once.whole:
+        return None, ""
+    said = wording.looking_at(once.trial, once.begin, once.end)
+    return Moment(trial=once.trial, begin=once.begin, end=once.end), said
 
 
 def _alternatives(choice: Choice, once: bool, alone: InOneRun | None) -> list[list[str]]:

@@ -268,6 +268,20 @@ class Shaken:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Moment:
+    """Where something happened that no other run shows.
+
+    Attributes:
+      trial: name of the run.
+      begin, end: between which seconds of its clock; None: it is held out, and no fit saw it.
+    """
+
+    trial: str
+    begin: int | None = None
+    end: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class OneRun:
     """Effects that explain more by acting in one run alone, or as much, as any in all runs do.
 
@@ -378,6 +392,7 @@ class Diagnosis:
       nearest: the explanation that comes nearest where none is named.
       one_run: what acts in one run alone, where that explains more (the verdict is unknown then),
         or as much (it is ambiguous).
+      moment: where something happened that no other run shows; None: nowhere, or not `unknown`.
       tipped: runs in which the chair of the model tips, and no channel shows that the real one did.
       probability: of every hypothesis; a pair is "a+b". more_missing: whether the effects leave
         something that is no noise. material: the largest missing force, and what matters.
@@ -400,6 +415,7 @@ class Diagnosis:
     drivers: list[MissingForce] = field(default_factory=list)
     nearest: Nearest | None = None
     one_run: OneRun | None = None
+    moment: Moment | None = None
     tipped: list[str] = field(default_factory=list)
     probability: dict[str, float] = field(default_factory=dict)
     more_missing: bool = False
@@ -424,6 +440,7 @@ class Diagnosis:
             "candidates": [c.to_dict() for c in self.candidates],
             "gap": asdict(self.gap) if self.gap else {},
             "one_run": self.one_run.to_dict() if self.one_run else None,
+            "moment": asdict(self.moment) if self.moment else None,
             "tipped": self.tipped,
             "where": [{**asdict(w), "window": list(w.window)} for w in self.where],
             "next_experiment": self.next_experiment,

@@ -23,6 +23,7 @@ from mjchair.diagnosis.result import (
     Estimate,
     GapSummary,
     MissingForce,
+    Moment,
     NamedEffect,
     OneRun,
 )
@@ -77,18 +78,29 @@ def missing(diagnosis: Diagnosis) -> str:
 
 
 def _unexplained(diagnosis: Diagnosis) -> str:
-    """That nothing is named, though one effect of the library may be the most probable."""
+    """That nothing is named: where it happened, or what is the most probable if that is known."""
+    if diagnosis.moment is not None:
+        return _moment_words(diagnosis.moment)
     first = next(iter(explanations(diagnosis)), None)
-    if first is not None and first.name == NONE:
-        return (
-            "A held-out run shows what no run of the fit does, or a test stands out that nothing "
-            "explains, so nothing is named."
-        )
-    if first is None or first.name in (OUTSIDE, ONE_RUN):
+    if first is None or first.name in (NONE, OUTSIDE, ONE_RUN):
         return "A force is missing that no effect of the library explains, so none is named."
     return (
         f"Something is missing. Of the library {hypothesis_words(first.name)} is the most "
         "probable, but it explains too little of these runs, or not all of them, so nothing is "
+        "named."
+    )
+
+
+def _moment_words(moment: Moment) -> str:
+    """What happened in one run that no other shows, as one sentence."""
+    if moment.begin is None:
+        return (
+            f"Something happened in {moment.trial}, which is held out, that no run of the fit "
+            "shows, so nothing is named."
+        )
+    return (
+        f"Something happened in {moment.trial} between {moment.begin} and {moment.end} s: a force "
+        "that acts there alone explains these runs about as well as any effect, so nothing is "
         "named."
     )
 

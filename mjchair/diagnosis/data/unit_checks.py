@@ -28,6 +28,7 @@ NEAR = 1.3  # factor within which two stories differ by a unit
 KMH, CLOSE = 3.6, 1.15  # km/h in a m/s; factor by which a wheel's radius may be wrong
 ALIKE = 0.95  # cosine of two stories that are one
 FORWARD, YAW, PULL = 0.05, 0.03, 0.05  # m/s, rad/s and m/s: motion below which nothing is compared
+SURELY = (0.98, 0.02)  # cosine from which so small a motion is compared, m/s: strokes make 0.04
 OTHER_START = 1.0  # m/s, and the speed itself, by which a first speed is not the one that is seen
 BIAS = 0.2  # rad/s, that a gyroscope may tell at rest (assumption)
 WAY = 0.5  # m by the wheels, below which it is not compared with the places
@@ -393,7 +394,8 @@ def _compare_with_acceleration(trial: Trial, axle: RearAxle) -> None:
     moves = sizes[1] > PULL * np.sqrt(speed.size)
     if moves and 1.0 / NEAR < ratio / axle.left < NEAR and alike > ALIKE:
         _refuse_rolled(trial, axle, f"it changes {ratio:.2f} times as {name} says")
-    if sizes[0] < PULL * np.sqrt(speed.size) or abs(alike) < ALIKE:
+    least = SURELY[1] if abs(alike) > SURELY[0] else PULL
+    if sizes[0] < least * np.sqrt(speed.size) or abs(alike) < ALIKE:
         return
     if alike < 0.0:
         raise MjchairError(
