@@ -22,6 +22,7 @@ from mjchair.diagnosis.data.standstill import BEFORE, ROCKS, ROLLS, rests, still
 from mjchair.diagnosis.data.study import Run
 
 Array = NDArray[np.float64]
+Stands = Sequence[tuple[float, float]]  # from when to when a chair stands, s
 
 LENGTH = 2.0  # s, of a window
 # where a caster shimmies: over many swings a chair that is a little other gets out of step, and a
@@ -74,8 +75,8 @@ def cut(
     for i, run in enumerate(runs):
         time, mine, shaken = run.trial.time, list[Window](), shimmy.stretches(run.trial)
         stands = [(float(time[a]), float(time[b - 1])) for a, b in still_stretches(run.trial)]
-        end = float(time[-1]) - (LATE if measured and run.trial.inputs is not None else 0.0)
-        for edges in _edges(run, step, _length(length, shaken), stands, end):
+        last = float(time[-1]) - (LATE if measured and run.trial.inputs is not None else 0.0)
+        for edges in _edges(run, step, _length(length, shaken), stands, last):
             for begin, end in pairwise(edges):
                 at_start = begin == time[0]
                 there = any(s.begin < end and begin < s.end for s in shaken)
@@ -117,24 +118,24 @@ def _length(usual: float, shaken: Sequence[shimmy.Stretch]) -> float:
     return min(usual, float(np.clip(SWINGS * swing, *SHORT)))
 
 
-def _stood(begin: float, step: float, stands: Sequence[tuple[float, float]]) -> float:
+def _stood(begin: float, step: float, stands: Stands) -> float:
     """How long the chair has stood as a window begins, s in steps, ROCKS at most."""
     stood = next((begin - a for a, b in stands if a < begin <= b), 0.0)
     return float(np.floor(min(stood, ROCKS) / step) * step)
 
 
-def _edges(
-    run: Run, step: float, length: float, stands: Sequence[tuple[float, float]], end: float
-) -> list[Array]:
+def _edges(run: Run, step: float, length: float, stands: Stands, last: float) -> list[Array]:
     """Edges (s) of the windows of every stretch of a run, between which it comes to rest.
 
+    A stretch that begins with a stand has an edge where the chair leaves it, if it stands for long.
+
     Args:
-      end: s, after which no sample counts.
+      last: s, after which no sample counts.
     """
     begin = zero = float(run.trial.time[0])
     out = []
-    for rest, onward in [*rests(run.trial), (stops(run) or end, np.inf)]:
-        stop = min(rest, end)
+    for rest, onward in [*rests(run.trial), (stops(run) or last, np.inf)]:
+        stop = min(rest, last)
         if stop < begin:
             break
         stands_until = next((b - BEFORE for a, b in stands if a <= begin < b), begin)
