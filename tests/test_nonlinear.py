@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from mjchair.diagnosis.fit import nonlinear
-from mjchair.diagnosis.fit.column_ids import ParameterId
+from mjchair.diagnosis.fit.column_ids import ParameterId, RoughlyKnown
 from mjchair.diagnosis.fit.nonlinear import ASTRAY, NEARER, Placed, from_other_side, refit
 from mjchair.diagnosis.fit.system import System
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.effects.effect import Effect, Parameter
+from mjchair.effects.library import find
 
 NOTHING = 100.0
 TRAIL = Effect(
@@ -77,3 +78,13 @@ def test_columns_of_the_other_side_tell_their_own_standard_errors(smaller, monke
         system=SimpleNamespace(nuisance=0),
     )
     assert from_other_side(bench, fitted) == {key: pytest.approx(0.005 / smaller, rel=1e-6)}
+
+
+def test_what_an_effect_covers_is_not_fitted_beside_it():
+    """Torques 25 ms late came as 16.7 beside 6.5 that the timing of inputs took."""
+    columns = {RoughlyKnown(n): [np.ones((3, 2))] for n in ("input_timing", "mass")}
+    late = Variant((), terms=(Term(find("torque_delay"), {"delay": 0.02}, ("delay",)),))
+    for variant, left in ((late, 0.0), (Variant(()), 1.0)):
+        beside = nonlinear._beside(variant, columns)
+        assert np.all(beside[RoughlyKnown("input_timing")][0] == left)
+        assert np.all(beside[RoughlyKnown("mass")][0] == 1.0)

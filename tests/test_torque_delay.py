@@ -27,9 +27,13 @@ TIME = np.arange(0.0, 6.0, 0.01)
 STROKES = push_strokes({"left_wheel": 5.0, "right_wheel": 4.5}, 5.5)
 
 
-def recorded(late):
+# one that ends amid a stroke, whose torque is recorded after the end
+ONWARD = push_strokes({"left_wheel": 5.0, "right_wheel": 4.5}, 9.0)
+
+
+def recorded(late, strokes=STROKES):
     """The strokes, as a device writes them that is late (s)."""
-    moved = {name: STROKES.at(name, TIME - late) for name in STROKES.controls}
+    moved = {name: strokes.at(name, TIME - late) for name in strokes.controls}
     return Inputs(TIME, moved)
 
 
@@ -60,13 +64,19 @@ def test_two_delays_add_and_stay_in_a_saved_model():
         assert torque_timing.recorded_late(model, 2) == 0.0  # a tire's
 
 
-def study():
+def study(strokes=STROKES, seconds=5.0):
     """Two pushed runs whose torques were recorded late, and a coast."""
     rng = np.random.default_rng(3)
     spec = mjchair.load_spec()
     start = Initial((0.0, 0.0), 0.0, 0.6)
-    runs = [noisy_run(rng, spec, f"push {k}", start, 5.0, replace(recorded(0.0))) for k in range(2)]
-    late = [replace(r, trial=replace(r.trial, inputs=recorded(DELAY))) for r in runs]
+    pushed = recorded(0.0, strokes)
+    runs = [noisy_run(rng, spec, f"push {k}", start, seconds, pushed) for k in range(2)]
+    inputs = [recorded(DELAY, strokes) for _ in runs]
+    known = [
+        Inputs(i.time[i.time <= seconds], {n: c[i.time <= seconds] for n, c in i.controls.items()})
+        for i in inputs
+    ]
+    late = [replace(r, trial=replace(r.trial, inputs=i)) for r, i in zip(runs, known, strict=True)]
     coast = noisy_run(rng, spec, "coast", Initial((0.0, 0.0), 0.0, 1.2), 4.0)
     return replace(make_study(spec, [*late, coast], NOISE), torque_measured=True)
 
@@ -86,9 +96,11 @@ def test_models_of_one_batch_keep_their_own_delays():
     np.testing.assert_array_equal(together, alone)
 
 
-def test_the_delay_comes_back():
-    """40 ms of another simulation were `unknown`, and chair and rider not one rigid body."""
-    bench, first = prepare(study(), threads=1)
+@pytest.mark.parametrize(("strokes", "seconds"), [(STROKES, 5.0), (ONWARD, 5.3)])
+def test_the_delay_comes_back(strokes, seconds):
+    """40 ms of another simulation were `unknown`, and chair and rider not one rigid body; 50 ms of
+    runs that end amid a stroke were a rider who moves, and two early sensors."""
+    bench, first = prepare(study(strokes, seconds), threads=1)
     base = screen_columns(bench, first, [find("torque_delay")])
     (found,) = hypotheses.singles(base.reduced, base.starts)
     fitted = Fits(base, lambda line: None).fit(found).fitted

@@ -148,6 +148,8 @@ class Effect:
       shared: what is only roughly known of any chair, and the parameters that move the same where
         all of them move as far: of the sum, the data say nothing.
       instead: what is only roughly known of any chair and would be wrong too, were it there.
+      covers: what is only roughly known of any study, and changes the same: it is not fitted beside
+        the effect.
       recording: whether it is no fault of the chair, but of how its runs were recorded.
       remark: what values and their standard errors say in one sentence, for a verdict that names
         the effect; None: their names and units say it.
@@ -177,6 +179,7 @@ class Effect:
     least: Callable[[mujoco.MjSpec], Values] | None = None
     shared: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     instead: tuple[str, ...] = ()
+    covers: tuple[str, ...] = ()
     recording: bool = False
     remark: Callable[[Mapping[str, float], Mapping[str, float]], str] | None = None
     by_hand: str = ""

@@ -40,6 +40,7 @@ EFFECT = Effect(
     commanded=False,
     drive=False,
     recording=True,
+    covers=("input_timing",),
     example={"delay": 0.06},
     remark=_size,
 )
