@@ -131,7 +131,7 @@ def descent(monkeypatch):
 @pytest.mark.parametrize(("most", "looked"), [(90.0, 1 + nonlinear.FEW), (np.inf, 13)])
 def test_a_fit_that_stays_worse_than_a_part_of_it_is_not_followed(most, looked, descent):
     bench, part = SimpleNamespace(simulator=None), SimpleNamespace(total=most)
-    found = nonlinear.refit(bench, None, None, {}, part=part)
+    found = nonlinear.refit(bench, Variant(()), None, {}, part=part)
     assert found.total == 1001.0 - looked
 
 
@@ -142,7 +142,7 @@ def test_a_fit_that_stays_worse_than_a_part_of_it_is_not_followed(most, looked, 
 def test_a_fit_that_promises_too_little_ends_after_a_round(reach, most, looked, descent):
     """One that is still worse than a part of it has a promise that says nothing."""
     bench, part = SimpleNamespace(simulator=None), SimpleNamespace(total=most)
-    found = nonlinear.refit(bench, None, None, {}, part=part, reach=reach)
+    found = nonlinear.refit(bench, Variant(()), None, {}, part=part, reach=reach)
     assert found.total == 1001.0 - looked
 
 
@@ -218,7 +218,7 @@ def test_a_better_place_beside_which_no_chair_can_be_is_a_step_that_failed(monke
     monkeypatch.setattr(nonlinear, "_around", around)
     monkeypatch.setattr(nonlinear, "_after_linear_step", lambda *_: None)
     monkeypatch.setattr(nonlinear, "_between", lambda *_: None)
-    assert nonlinear.refit(SimpleNamespace(simulator=None), None, None, {}) is start
+    assert nonlinear.refit(SimpleNamespace(simulator=None), Variant(()), None, {}) is start
     assert next(totals) == 1000 - 1 - nonlinear.FAILS
 
 
