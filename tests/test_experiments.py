@@ -366,5 +366,5 @@ def test_what_was_moved_far_is_to_be_measured():
     assert "weigh the casters): +0.027 m, 2.7 sigmas" in said
     assert "-25 %, 2.5 sigmas" in said
     assert wording.measuring([]) == ""
-    gain = Nuisance("scale:imu_gyro", 0.01, "1", channel="imu_gyro.z", error=SensorError.SCALE)
+    gain = Nuisance("scale:imu_gyro.z", 0.01, "1", channel="imu_gyro.z", error=SensorError.SCALE)
     assert "the gain of imu_gyro.z: +5 %, 4.9 sigmas" in wording.measuring([(gain, 4.9)])

@@ -17,6 +17,7 @@ from mjchair.diagnosis.explain.column_ids import Driver, Quantity
 from mjchair.diagnosis.explain.missing_force import Products, mean_forces
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.variant import Term, Variant
+from mjchair.diagnosis.next_experiment import wording
 from mjchair.diagnosis.replay.pulses import Force, Pulse
 from mjchair.diagnosis.result import (
     Candidate,
@@ -722,7 +723,7 @@ def test_what_a_person_does_that_nothing_shows_is_told_where_it_counts():
 def test_what_is_roughly_known_of_a_sensor_is_in_words():
     names = ("centre_x", "bias:imu_gyro.z", "scale:left_wheel_speed")
     said = ["centre x", "bias of imu_gyro.z", "gain of left_wheel_speed"]
-    assert [words.roughly_known(name) for name in names] == said
+    assert [wording.roughly_known(name) for name in names] == said
 
 
 def test_a_model_that_tips_where_nothing_shows_it_is_said_first():

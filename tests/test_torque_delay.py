@@ -71,12 +71,9 @@ def study(strokes=STROKES, seconds=5.0):
     start = Initial((0.0, 0.0), 0.0, 0.6)
     pushed = recorded(0.0, strokes)
     runs = [noisy_run(rng, spec, f"push {k}", start, seconds, pushed) for k in range(2)]
-    inputs = [recorded(DELAY, strokes) for _ in runs]
-    known = [
-        Inputs(i.time[i.time <= seconds], {n: c[i.time <= seconds] for n, c in i.controls.items()})
-        for i in inputs
-    ]
-    late = [replace(r, trial=replace(r.trial, inputs=i)) for r, i in zip(runs, known, strict=True)]
+    device, there = recorded(DELAY, strokes), seconds >= TIME
+    known = Inputs(TIME[there], {name: torque[there] for name, torque in device.controls.items()})
+    late = [replace(r, trial=replace(r.trial, inputs=known)) for r in runs]
     coast = noisy_run(rng, spec, "coast", Initial((0.0, 0.0), 0.0, 1.2), 4.0)
     return replace(make_study(spec, [*late, coast], NOISE), torque_measured=True)
 

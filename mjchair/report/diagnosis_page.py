@@ -19,7 +19,7 @@ import matplotlib
 from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
-from mjchair.diagnosis.next_experiment.wording import plain
+from mjchair.diagnosis.next_experiment.wording import plain, roughly_known
 from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.result import Candidate, Diagnosis
 from mjchair.effects.library import find
@@ -316,7 +316,7 @@ def _moved(diagnosis: Diagnosis) -> Table:
     rows = [
         Row(
             [
-                diagnosis_words.roughly_known(m.name),
+                roughly_known(m.name),
                 f"{m.std:.3g}",
                 m.unit,
                 f"{m.by * m.std:+.2g}",

@@ -40,7 +40,6 @@ NOTED = 1.2  # times the noise: where held-out runs leave more, and nothing is m
 A_GAP = 0.8  # of what a correction leaves: where no more than this is a gap, the rest is explained
 STAYS = 0.95  # of a gap on held-out runs: a correction that leaves more does not change it
 ALL = 0.995  # of a gap: more is not told as 100 %
-ERRORS = {"bias": "bias", "scale": "gain"}
 LITTLE = 0.01  # of a person's force: less is not told
 FAINT = 1e-3  # of the loudest: less of what shakes a chair is nothing
 MUCH = 0.15  # share by which a fit moved what a person can measure, worth a word beside a name
@@ -672,12 +671,6 @@ def _parameters(effect: NamedEffect) -> Iterable[str]:
 def open_upwards(p: Estimate) -> str:
     """The least size of a number that may be far larger; empty: it is no such number."""
     return "" if p.at_least is None else f"at least {p.at_least:.2g}"
-
-
-def roughly_known(name: str) -> str:
-    """What is only roughly known as words: of the chair, or the bias or gain of a sensor."""
-    error, _, channel = name.partition(":")
-    return f"{ERRORS[error]} of {channel}" if channel else plain(name)
 
 
 def bold(name: str) -> str:

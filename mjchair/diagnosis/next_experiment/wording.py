@@ -112,9 +112,18 @@ MEASURED = {
 }
 
 
+ERRORS = {"bias": "bias", "scale": "gain"}
+
+
+def roughly_known(name: str) -> str:
+    """What is only roughly known as words: of the chair, or the bias or gain of a sensor."""
+    error, _, channel = name.partition(":")
+    return f"{ERRORS[error]} of {channel}" if channel else plain(name)
+
+
 def measured(name: str) -> str:
-    """A number that is only roughly known, by its name, as words."""
-    return MEASURED.get(name, f"the {plain(name)}")
+    """A number that is only roughly known, by its name, as a person would measure it."""
+    return MEASURED.get(name, f"the {roughly_known(name)}")
 
 
 def changed(number: Nuisance, by: float, digits: int = 0) -> str:
@@ -136,18 +145,13 @@ def measuring(moved: Sequence[tuple[Nuisance, float]]) -> str:
       moved: what is only roughly known, and by how many of its standard deviations it was moved,
         of those that are far; empty where none is.
     """
-    said = [f"{_numbered(n)}: {changed(n, by)}, {abs(by):.1f} sigmas" for n, by in moved]
+    said = [f"{measured(n.name)}: {changed(n, by)}, {abs(by):.1f} sigmas" for n, by in moved]
     if not said:
         return ""
     return (
         f"Measure what these runs put far from what the study says: {'; '.join(said)}. If it is "
         "as the study says, something else is missing."
     )
-
-
-def _numbered(number: Nuisance) -> str:
-    """A number that is only roughly known as words; of a sensor, its gain."""
-    return f"the gain of {number.channel}" if number.channel else measured(number.name)
 
 
 WHEEL = (

@@ -116,8 +116,9 @@ class WindowSimulator:
         self.base = self.spec.copy().compile()
         self.chair = Chair(self.base)
         self.step = float(self.base.opt.timestep)
-        whole = cut(study.runs, self.step, measured=study.driven_as_measured)
-        self.windows = whole if windows is None else list(windows)
+        if windows is None:
+            windows = cut(study.runs, self.step, measured=study.driven_as_measured)
+        self.windows = list(windows)
         self.rolls = self._rolling()
         self.coarse = self._coarse_step()
         self._places: dict[int, list[int]] = {}
