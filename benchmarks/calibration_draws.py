@@ -32,7 +32,13 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import alternatives, forward_selection, hypotheses, selection
+from mjchair.diagnosis.explain import (
+    alternatives,
+    forward_selection,
+    hypotheses,
+    search_rules,
+    selection,
+)
 from mjchair.diagnosis.explain import gap as gaps
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.fits import Fits
@@ -485,7 +491,7 @@ class Weighing:
             - free.total
             + float(right @ (np.linalg.solve(unit, right / scale) / scale))
         )
-        penalty = rules.PENALTY * sum(len(s.free) for s in starts)
+        penalty = search_rules.PENALTY * sum(len(s.free) for s in starts)
         prior = 2.0 * sum(math.log(s.effect.common) for s in starts)
         return gain - penalty + prior < self.best.get(id(reduced), -np.inf) - BEHIND
 

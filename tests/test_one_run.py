@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mjchair.diagnosis import decide, notes, rules
-from mjchair.diagnosis.explain import event, one_run, screening
+from mjchair.diagnosis.explain import event, one_run, screening, search_rules
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.column_ids import EffectColumn, EffectGroup
 from mjchair.diagnosis.explain.hypotheses import weigh
@@ -135,15 +135,15 @@ def test_one_run_has_no_others_to_differ_from():
 
 
 def test_little_more_is_no_finding_nor_what_linear_algebra_may_be_wrong_by():
-    assert rules.is_of_one_run(by=16.0, gain=100.0)
-    assert not rules.is_of_one_run(by=14.0, gain=100.0)
-    assert not rules.is_of_one_run(by=90.0, gain=1000.0)
+    assert search_rules.is_of_one_run(by=16.0, gain=100.0)
+    assert not search_rules.is_of_one_run(by=14.0, gain=100.0)
+    assert not search_rules.is_of_one_run(by=90.0, gain=1000.0)
 
 
 def test_in_the_place_of_what_is_no_answer_it_need_only_fit_better_and_close_the_gap():
-    assert rules.may_be_of_one_run(by=4.0, gain=860.0, excess=910.0)
-    assert not rules.may_be_of_one_run(by=-1.0, gain=860.0, excess=910.0)
-    assert not rules.may_be_of_one_run(by=4.0, gain=600.0, excess=910.0)
+    assert search_rules.may_be_of_one_run(by=4.0, gain=860.0, excess=910.0)
+    assert not search_rules.may_be_of_one_run(by=-1.0, gain=860.0, excess=910.0)
+    assert not search_rules.may_be_of_one_run(by=4.0, gain=600.0, excess=910.0)
     base, drag = problem((0.6, 1.5, 0.7))
     assert found_in(base, drag) is None
     base, drag = problem((0.0, 1.5, 0.0))
@@ -161,9 +161,9 @@ def test_what_happens_in_two_seconds_does_not_act_all_along(pushes):
 
 
 def test_with_fewer_numbers_one_run_is_a_rival_and_nothing_is_named():
-    assert rules.fits_alike_in_one_run(by=-1.0, fewer=True)
-    assert not rules.fits_alike_in_one_run(by=-9.0, fewer=True)
-    assert not rules.fits_alike_in_one_run(by=0.0, fewer=False)
+    assert search_rules.fits_alike_in_one_run(by=-1.0, fewer=True)
+    assert not search_rules.fits_alike_in_one_run(by=-9.0, fewer=True)
+    assert not search_rules.fits_alike_in_one_run(by=0.0, fewer=False)
     stands = {"closure": 1.0, "gap_left": False, "gain_by_run": 99.0, "gain_by_manoeuvre": 9.0}
     choice = rules.Standing(**stands, sigmas=(9.0,), at_bound=False, one_alike=True)
     assert rules.verdict(gap=True, choice=choice) == rules.Verdict.AMBIGUOUS

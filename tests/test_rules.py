@@ -3,10 +3,10 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from mjchair.diagnosis import notes, rules
+from mjchair.diagnosis.explain import search_rules
 from mjchair.diagnosis.result import Estimate
 from mjchair.diagnosis.rules import HeldOut, Standing, Verdict
 from mjchair.report.diagnosis_words import nothing_missing, turn_words
@@ -248,32 +248,16 @@ def test_closure_stays_between_nothing_and_all():
 
 
 def test_a_further_effect_pays_for_its_parameters():
-    enough = rules.needed(2)
-    assert enough == 2.0 * rules.PENALTY + rules.WORTH
+    enough = search_rules.needed(2)
+    assert enough == 2.0 * search_rules.PENALTY + search_rules.WORTH
     held = {"held": rules.HELD, "parameters": 2, "gain": 1000.0}
-    assert rules.worth_adding(gained=enough, **held)
-    assert not rules.worth_adding(gained=enough - 0.1, **held)
+    assert search_rules.worth_adding(gained=enough, **held)
+    assert not search_rules.worth_adding(gained=enough - 0.1, **held)
 
 
 def test_a_further_effect_holds_on_runs_that_it_was_not_fitted_to():
-    assert not rules.worth_adding(gained=1e4, parameters=1, held=rules.HELD - 0.1, gain=2e4)
-    assert rules.worth_adding(gained=1e4, parameters=1, held=rules.HELD, gain=2e4)
-
-
-@pytest.mark.parametrize(("own", "worth"), [(650.0, False), (670.0, True)])
-def test_a_further_effect_brings_more_than_the_form_of_a_large_one_leaves(own, worth):
-    """A rider's motion brings 330 000, of which forms that are 4.5 % wrong leave 0.2 %."""
-    gain = 330_000.0
-    assert rules.beyond_form(own=own, gain=gain) == worth
-    assert rules.worth_adding(gained=own, parameters=2, held=500.0, gain=gain) == worth
-
-
-def test_a_hypothesis_near_the_best_is_fitted_too():
-    assert rules.worth_trying(score=901.0, best=1000.0, gain=1000.0)
-    assert not rules.worth_trying(score=899.0, best=1000.0, gain=1000.0)
-    assert rules.worth_trying(score=11.0, best=20.0, gain=20.0)  # within what keeps a rival
-    assert rules.worth_trying(score=801.0, best=1000.0, gain=1000.0, coarse=True)
-    assert not rules.worth_trying(score=799.0, best=1000.0, gain=1000.0, coarse=True)
+    assert not search_rules.worth_adding(gained=1e4, parameters=1, held=rules.HELD - 0.1, gain=2e4)
+    assert search_rules.worth_adding(gained=1e4, parameters=1, held=rules.HELD, gain=2e4)
 
 
 def test_what_an_answer_leaves_is_said():
@@ -394,102 +378,12 @@ def test_what_is_needed_of_a_further_run_decides():
     for share, once in ((0.99, True), (1.01, False)):
         assert rules.happened_once(event=900.0, gain=908.0 + share * more) == once
     behind, gain = 20.0, 5000.0
-    more = rules.to_rule_out(behind=behind, gain=gain)
+    more = search_rules.to_rule_out(behind=behind, gain=gain)
     for share, stays in ((0.99, True), (1.01, False)):
         far = behind + share * more
-        assert stays == rules.stays_a_rival(behind=far, gain=gain, errors=9.0, beyond_bound=False)
-
-
-def test_a_number_is_believed_that_data_tell_better_than_its_bounds():
-    assert rules.believable(std=0.9, change=0.2, width=10.0)
-    assert not rules.believable(std=1.0, change=0.2, width=10.0)  # five sizes worth finding
-    assert not rules.believable(std=0.3, change=0.2, width=1.0)  # as wide as the bounds allow
-
-
-def test_a_fit_ends_elsewhere_where_it_misses_more_than_linear_algebra_may():
-    """Of a gain of 600, linear algebra may be wrong by a tenth; of a small one by 30."""
-    assert rules.ends_elsewhere(behind=734.0, promised=11.0, gain=590.0)
-    assert not rules.ends_elsewhere(behind=70.0, promised=11.0, gain=600.0)
-    assert not rules.ends_elsewhere(behind=734.0, promised=700.0, gain=590.0)
-    assert not rules.ends_elsewhere(behind=29.0, promised=0.0, gain=50.0)
-    assert rules.ends_elsewhere(behind=31.0, promised=0.0, gain=50.0)
-
-
-def test_two_starts_that_end_apart_are_told():
-    assert not rules.starts_disagree(100.0, 100.0 + rules.WORTH)
-    assert rules.starts_disagree(100.0, 101.0 + rules.WORTH)
-
-
-def test_an_effect_without_promise_is_not_fitted():
-    enough = rules.HOPELESS * rules.needed(2)
-    assert rules.may_be_worth_adding(promised=enough, parameters=2, gain=100.0)
-    assert not rules.may_be_worth_adding(promised=0.99 * enough, parameters=2, gain=100.0)
-    # forms that are a little wrong leave more than this beside a chi2 of 90 000
-    assert not rules.may_be_worth_adding(promised=enough, parameters=2, gain=90_000.0)
-    assert rules.worth_adding(gained=180.0, parameters=2, held=20.0, gain=90_000.0)
-
-
-def test_an_effect_is_dropped_where_the_others_lose_little():
-    enough = rules.needed(1)
-    assert rules.can_be_dropped(lost=enough - 0.1, parameters=1)
-    assert not rules.can_be_dropped(lost=enough, parameters=1)
-    assert not rules.can_be_dropped(lost=enough, parameters=0)
-
-
-def test_trying_without_is_saved_only_where_both_signs_are_clear():
-    lost = 3.1 * rules.needed(1)
-    assert rules.surely_needed(sigmas=rules.SURE + 0.1, lost=lost, parameters=1)
-    assert not rules.surely_needed(sigmas=rules.SURE, lost=lost, parameters=1)
-    assert not rules.surely_needed(sigmas=20.0, lost=0.9 * lost, parameters=1)
-
-
-def test_ties_are_told_by_scores():
-    assert rules.alike(100.0 - rules.TIE + 0.1, 100.0)
-    assert not rules.alike(100.0 - rules.TIE, 100.0)
-
-
-def test_a_fit_starts_again_where_it_misses_the_promise():
-    assert not rules.fell_short(total=1040.0, promised=1000.0, gain=50.0)  # a small effect
-    assert not rules.fell_short(total=1019.0, promised=1000.0, gain=200.0)
-    assert rules.fell_short(total=1021.0, promised=1000.0, gain=200.0)
-    assert not rules.fell_short(total=1099.0, promised=1000.0, gain=1000.0)
-    assert rules.fell_short(total=1101.0, promised=1000.0, gain=1000.0)
-    # and from the same chi2 on a fit of the noise is not followed
-    assert rules.short_of(promised=1000.0, gain=1000.0) == pytest.approx(1100.0)
-    assert rules.short_of(promised=1000.0, gain=50.0) == float("inf")
-
-
-def test_a_rival_is_fitted_where_linear_algebra_leaves_it_near():
-    assert rules.worth_refitting(behind=9.9, gain=1000.0, rival_gain=0.0)
-    # 30 behind of a gain of 100: three times two paired errors of 5.5 are 33
-    assert rules.worth_refitting(behind=30.0, gain=150.0, rival_gain=121.0)
-    assert not rules.worth_refitting(behind=34.0, gain=150.0, rival_gain=121.0)
-    assert not rules.worth_refitting(behind=30.0, gain=150.0, rival_gain=119.0)  # 80 % of the gain
-    # what linear algebra gets wrong of a large gain is larger than what decides
-    assert rules.worth_refitting(behind=990.0, gain=10_000.0, rival_gain=0.0)
-    assert not rules.worth_refitting(behind=1010.0, gain=10_000.0, rival_gain=0.0)
-
-
-def test_a_fit_is_stuck_where_its_own_step_promises_what_decides():
-    assert not rules.is_stuck(total=1009.0, promised=1000.0)
-    assert rules.is_stuck(total=1011.0, promised=1000.0)
-
-
-@pytest.mark.parametrize(
-    ("behind", "gain", "errors", "beyond", "stays"),
-    [
-        (9.9, 100.0, 9.0, False, True),
-        (100.0, 1000.0, 1.9, False, True),
-        (501.0, 1000.0, 0.9, False, False),  # no scatter makes a rival of half an explanation
-        (10.0, 400.0, 2.0, False, False),
-        (199.0, 10_000.0, 9.0, False, True),  # 2 % of the gain is a matter of form
-        (201.0, 10_000.0, 9.0, False, False),
-        (0.0, 100.0, 0.0, True, False),
-    ],
-)
-def test_what_keeps_a_rival(behind, gain, errors, beyond, stays):
-    kept = rules.stays_a_rival(behind=behind, gain=gain, errors=errors, beyond_bound=beyond)
-    assert kept == stays
+        assert stays == search_rules.stays_a_rival(
+            behind=far, gain=gain, errors=9.0, beyond_bound=False
+        )
 
 
 def test_what_is_probable_is_shown_as_a_rival():
@@ -518,32 +412,7 @@ def test_what_was_moved_far_is_measured_to_either_side():
     assert not rules.is_far(2.4)
 
 
-def test_paired_errors_count_windows_not_samples():
-    difference = np.random.default_rng(0).normal(1.0, 2.0, 40)
-    expected = difference.mean() / (difference.std(ddof=1) / np.sqrt(40))
-    assert rules.paired_errors(difference.sum(), difference) == pytest.approx(expected)
-    assert rules.paired_errors(7.0, np.array([7.0])) == 7.0
-
-
-def test_the_price_of_parameters_counts_beside_the_scatter_of_windows():
-    """Six numbers of a moving rider fitted a drive's lag 19 of chi2 worse, 11 in one window."""
-    difference = np.array([10.9, 1.2, 1.2, 0.6, -0.6, 0.4, 0.1, 0.0])
-    assert rules.paired_errors(difference.sum(), difference) < rules.RIVAL_ERRORS
-    assert rules.paired_errors(difference.sum() + 45.0, difference) > rules.RIVAL_ERRORS
-    # one number in the place of six does not excuse what it misses
-    fewer = rules.paired_errors(difference.sum() - 10.0, difference)
-    assert fewer == rules.paired_errors(difference.sum(), difference)
-
-
 def test_what_leaves_a_number_on_its_wall_is_not_named_alone():
     """What pushes the number there may be all that is missing."""
     assert rules.verdict(True, CLEAR) == Verdict.NAMED
     assert rules.verdict(True, replace(CLEAR, walls=1)) == Verdict.AMBIGUOUS
-
-
-def test_a_whole_size_is_followed_as_far_as_it_may_be_the_best_beside_another():
-    assert rules.reach_of_whole(best=1000.0, gain=100.0) == rules.reach(best=1000.0, gain=100.0)
-    reach = rules.reach_of_whole(best=1000.0, gain=5000.0)
-    brings = 6000.0 - reach
-    assert rules.is_just_behind(gain=brings + 1.0, best=5000.0)
-    assert not rules.is_just_behind(gain=brings - 1.0, best=5000.0)

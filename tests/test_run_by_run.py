@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import search_rules
 from mjchair.diagnosis.explain.run_by_run import uneven
 from mjchair.diagnosis.fit.column_ids import ParameterId, RoughlyKnown
 from mjchair.diagnosis.fit.variant import Term
@@ -68,7 +68,7 @@ def test_a_drag_that_stays_is_of_one_size():
 
 def test_what_is_small_beside_the_effect_or_may_be_chance_does_not_differ():
     gained = {"gained": 40.0, "free": 4}
-    assert rules.differs_by_run(**gained, brought=300.0)
-    assert not rules.differs_by_run(**gained, brought=500.0)
-    assert not rules.differs_by_run(gained=20.0, free=4, brought=100.0)
-    assert not rules.differs_by_run(gained=40.0, free=0, brought=100.0)
+    assert search_rules.differs_by_run(**gained, brought=300.0)
+    assert not search_rules.differs_by_run(**gained, brought=500.0)
+    assert not search_rules.differs_by_run(gained=20.0, free=4, brought=100.0)
+    assert not search_rules.differs_by_run(gained=40.0, free=0, brought=100.0)

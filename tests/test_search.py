@@ -30,6 +30,7 @@ from mjchair.diagnosis.explain import (
     probable,
     rivals,
     screening,
+    search_rules,
     selection,
     shortlist,
     whole_beside,
@@ -338,7 +339,7 @@ def test_what_is_made_anew_around_a_fit_that_goes_far_ends_as_soon_as_the_fit(fi
         fits.answers["rolling", before] = ended
     best = Tried(Hypothesis((MOTOR,), gain=610.0, score=600.0), fit(1390.0, "motor"))
     searching().fit(ONE, best)
-    assert fits.reaches == [rules.reach(best=1390.0, gain=610.0)] * 3
+    assert fits.reaches == [search_rules.reach(best=1390.0, gain=610.0)] * 3
 
 
 def test_where_the_linear_order_is_coarse_more_are_fitted(monkeypatch):
@@ -1335,7 +1336,7 @@ def test_what_only_shapes_an_effect_is_no_further_number(name, free, counted):
     one = SimpleNamespace(effect=find(name), free=free, columns=free)
     weighed = hypotheses.priced([one], 900.0)
     assert weighed.free == counted
-    assert weighed.score - weighed.prior == pytest.approx(900.0 - rules.PENALTY * counted)
+    assert weighed.score - weighed.prior == pytest.approx(900.0 - search_rules.PENALTY * counted)
 
 
 def test_what_data_do_not_tell_of_a_shape_is_known_to_its_bounds():
@@ -1345,7 +1346,7 @@ def test_what_data_do_not_tell_of_a_shape_is_known_to_its_bounds():
     with mock.patch.object(fits_of_hypotheses, "replace", put):
         std = fits_of_hypotheses.with_form_errors(told).std
     assert std[rate] == p.high - p.low
-    assert std[moment] == pytest.approx(np.hypot(0.2, 2.0 * rules.SIZE_BY_FORM))
+    assert std[moment] == pytest.approx(np.hypot(0.2, 2.0 * search_rules.SIZE_BY_FORM))
 
 
 def test_ends_are_alike_within_a_tenth_of_a_standard_error():

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import mjchair
-from mjchair.diagnosis import rules
 from mjchair.diagnosis.data import roughly_known
+from mjchair.diagnosis.explain import search_rules
 from mjchair.diagnosis.fit import nonlinear
 from mjchair.diagnosis.fit.column_ids import ParameterId, RoughlyKnown
 from mjchair.diagnosis.fit.parameter_columns import shared_columns
@@ -109,7 +109,7 @@ def test_a_wind_is_there_though_its_drag_area_is_not_known(speed, there):
     system = SimpleNamespace(index=lambda keys: list(range(len(keys))))
     sigmas = nonlinear._sigmas(term, system, np.linalg.inv(J.T @ J))
     assert sigmas == pytest.approx(speed / term.effect.parameter("x").change / 0.1)
-    assert rules.is_there(sigmas=sigmas) == there
+    assert search_rules.is_there(sigmas=sigmas) == there
 
 
 @pytest.fixture

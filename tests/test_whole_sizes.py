@@ -12,8 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import whole_beside, whole_sizes
+from mjchair.diagnosis.explain import search_rules, whole_beside, whole_sizes
 from mjchair.diagnosis.explain.whole_sizes import Seen
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.variant import Term, Variant
@@ -113,10 +112,10 @@ def test_a_fit_from_a_size_ends_where_it_falls_too_far_behind(monkeypatch, besid
     other = SimpleNamespace(total=1000.0, **vars(told))
     if beside:
         assert list(whole_beside.fits(base, other, other)) == [((scrub,), "the fit")]
-        assert reaches == [rules.reach_of_whole(best=1000.0, gain=5000.0)]
+        assert reaches == [search_rules.reach_of_whole(best=1000.0, gain=5000.0)]
         return
     assert list(whole_sizes.fits(base, other)) == list(whole_sizes.fits(base))
-    assert reaches == [rules.reach_of_whole(best=1000.0, gain=5000.0), math.inf]
+    assert reaches == [search_rules.reach_of_whole(best=1000.0, gain=5000.0), math.inf]
 
 
 @pytest.mark.parametrize(("swing", "as_measured"), [(0.3, True), (0.1, False)])
@@ -145,7 +144,7 @@ def test_a_chair_that_does_not_shimmy_as_measured_is_no_measure_of_one_that_may(
     )
     other = SimpleNamespace(total=1000.0, track=SimpleNamespace(predicted=[shown]), **told)
     assert list(whole_sizes.fits(base, other)) == [("a start", "a fit")]
-    near = rules.reach_of_whole(best=1000.0, gain=5000.0)
+    near = search_rules.reach_of_whole(best=1000.0, gain=5000.0)
     assert reaches == [near if as_measured else math.inf]
 
 

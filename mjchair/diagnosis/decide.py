@@ -16,7 +16,7 @@ from scipy import stats
 
 from mjchair.diagnosis import notes, rules
 from mjchair.diagnosis.evidence import evidence, missing_forces
-from mjchair.diagnosis.explain import event, hypotheses, missing_force, noise_shown
+from mjchair.diagnosis.explain import event, hypotheses, missing_force, noise_shown, search_rules
 from mjchair.diagnosis.explain.calibration import NONE
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Choice, closure
@@ -314,7 +314,7 @@ def _plan(base: Base, choice: Choice, once: bool) -> tuple[Plan | None, list[str
     rivals = [rival for *_, rival in exchanged(choice)]
     near = [rival.fitted for rival in rivals]
     needed = [
-        rules.to_rule_out(
+        search_rules.to_rule_out(
             behind=rival.fitted.total - chosen.total,
             gain=choice.brought_beyond(rival.hypothesis),
         )

@@ -14,7 +14,7 @@ from operator import attrgetter
 import numpy as np
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import hypotheses, whole_beside, whole_sizes
+from mjchair.diagnosis.explain import hypotheses, search_rules, whole_beside, whole_sizes
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Tried
 from mjchair.diagnosis.explain.fits import Fits, believable
@@ -103,7 +103,9 @@ def _other_forms(fits: Fits, best: Tried) -> list[Hypothesis]:
         h
         for h in firsts
         if fits.is_physical(h)
-        and rules.worth_trying(score=h.score, best=best.hypothesis.score, gain=best.hypothesis.gain)
+        and search_rules.worth_trying(
+            score=h.score, best=best.hypothesis.score, gain=best.hypothesis.gain
+        )
     ]
     return sorted(near, key=lambda h: -h.score)
 

@@ -6,6 +6,7 @@ In: fits, and a hypothesis with its fit. Out: the same, or one of fewer effects.
 from __future__ import annotations
 
 from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import search_rules
 from mjchair.diagnosis.explain.choice import Tried
 from mjchair.diagnosis.explain.fits import Fits
 
@@ -21,7 +22,7 @@ def without_needless(fits: Fits, tried: Tried) -> Tried:
         fewer = fits.weigh([s for s in hypothesis.starts if s is not start])
         parameters = hypothesis.free - fewer.free
         less = hypothesis.gain - fewer.gain
-        if rules.surely_needed(sigmas=sigmas, lost=less, parameters=parameters):
+        if search_rules.surely_needed(sigmas=sigmas, lost=less, parameters=parameters):
             continue
         if sigmas < rules.SIGMAS:
             fits.begin_at(fewer, fitted)
@@ -29,6 +30,6 @@ def without_needless(fits: Fits, tried: Tried) -> Tried:
         if other is None:
             continue
         lost = fits.anew(other).total - fitted.total
-        if rules.can_be_dropped(lost=lost, parameters=parameters):
+        if search_rules.can_be_dropped(lost=lost, parameters=parameters):
             return without_needless(fits, other)
     return tried

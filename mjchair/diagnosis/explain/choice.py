@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import search_rules
 from mjchair.diagnosis.explain.column_ids import EffectGroup, ForceGroup
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
@@ -84,7 +85,7 @@ def is_there(fitted: Fitted) -> bool:
     A wind has a drag area, so one that ends nearly still stands for the drag of the air.
     """
     shaped = [t for t in fitted.variant.terms if any(not p.sized for _, p in t.parameters)]
-    return all(rules.is_there(sigmas=fitted.sigmas[t.effect.key]) for t in shaped)
+    return all(search_rules.is_there(sigmas=fitted.sigmas[t.effect.key]) for t in shaped)
 
 
 def is_pushed(rival: Tried, chosen: Tried, brought: float) -> bool:
@@ -98,7 +99,7 @@ def is_pushed(rival: Tried, chosen: Tried, brought: float) -> bool:
     """
     theirs, ours = (set(bounded.at_walls(t.fitted.variant.offsets)) for t in (rival, chosen))
     behind = rival.price - chosen.price
-    return bool(theirs - ours) and behind >= rules.not_ruled_out(gain=brought)
+    return bool(theirs - ours) and behind >= search_rules.not_ruled_out(gain=brought)
 
 
 def closure(gap: Gap, base: Base, fitted: Fitted, after: Gap) -> float:

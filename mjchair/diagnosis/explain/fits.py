@@ -13,8 +13,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from operator import attrgetter
 
-from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import hypotheses, open_ended, profile, whole_sizes
+from mjchair.diagnosis.explain import hypotheses, open_ended, profile, search_rules, whole_sizes
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Tried, is_there
 from mjchair.diagnosis.explain.gap import Gap
@@ -181,7 +180,7 @@ class Fits:
     def _columns_hold(self, fitted: Fitted) -> bool:
         """Whether small effects stand where all columns are as good as they would be anew."""
         missed = fitted.total - fitted.promised
-        small = rules.columns_hold(gain=gain(self.base, fitted), missed=missed)
+        small = search_rules.columns_hold(gain=gain(self.base, fitted), missed=missed)
         return small and not goes_far(fitted)
 
     def _remade(self, tried: Tried) -> Fitted:
@@ -243,7 +242,7 @@ def with_form_errors(fitted: Fitted) -> Fitted:
         for key, p in term.parameters:
             if p.sized and term.effect.sensor is None:
                 size = abs(term.values[p.name] - p.neutral)
-                std[key] = math.hypot(std[key], rules.SIZE_BY_FORM * size)
+                std[key] = math.hypot(std[key], search_rules.SIZE_BY_FORM * size)
             elif not p.sized:
                 std[key] = min(std[key], p.high - p.low)
     return replace(fitted, std=std)
@@ -256,7 +255,7 @@ def believable(fitted: Fitted) -> bool:
         is_there(fitted)
         and not fitted.at_bound
         and all(
-            rules.believable(std=fitted.std[key], change=p.change, width=p.high - p.low)
+            search_rules.believable(std=fitted.std[key], change=p.change, width=p.high - p.low)
             for key, p in sized
         )
     )

@@ -7,7 +7,14 @@ grows as long as it leaves a gap and a further effect is worth it.
 from __future__ import annotations
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import alternatives, event, left_out, left_over, whole_sizes
+from mjchair.diagnosis.explain import (
+    alternatives,
+    event,
+    left_out,
+    left_over,
+    search_rules,
+    whole_sizes,
+)
 from mjchair.diagnosis.explain.choice import Tried
 from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.screening import gain, goes_far
@@ -37,7 +44,7 @@ def grown(fits: Fits) -> WithGap | None:
 def _grown_from(fits: Fits, here: WithGap | None) -> WithGap | None:
     """The best hypothesis, grown from this one; None: there is none."""
     size = len(here[0].hypothesis.starts) if here else 0
-    while size < rules.MOST and (here is None or here[1].exists):
+    while size < search_rules.MOST and (here is None or here[1].exists):
         if size == 1 and _happened_once(fits, brought := _brought(fits, here)):
             return None if _is_rather_once(fits, brought) else here
         size += 1
@@ -78,7 +85,7 @@ def _happened_once(fits: Fits, brought: float) -> bool:
 def _is_rather_once(fits: Fits, brought: float) -> bool:
     """Whether what happened once explains so much more that no effect is an answer."""
     once = event.largest(fits.base).gain
-    return rules.is_of_one_run(by=once - brought, gain=once)
+    return search_rules.is_of_one_run(by=once - brought, gain=once)
 
 
 def _brought(fits: Fits, here: WithGap | None) -> float:
@@ -151,7 +158,7 @@ def _whole_ones_behind(fits: Fits, best: Tried) -> list[Tried]:
         if t.hypothesis.keys != best.hypothesis.keys
         and len(t.hypothesis.starts) == 1
         and whole_sizes.parameter_of(t.hypothesis.starts[0].effect) is not None
-        and rules.is_just_behind(gain=gain(fits.base, t.fitted), best=brings)
+        and search_rules.is_just_behind(gain=gain(fits.base, t.fitted), best=brings)
     ]
 
 
@@ -182,7 +189,7 @@ def beyond_bound(fits: Fits, here: WithGap, size: int) -> WithGap | None:
     bound = [
         t
         for t in fits.tried
-        if len(t.hypothesis.starts) == size < rules.MOST
+        if len(t.hypothesis.starts) == size < search_rules.MOST
         and t.fitted.total < here[0].fitted.total
         and t.fitted.at_bound
     ]

@@ -19,9 +19,8 @@ from operator import attrgetter
 
 import numpy as np
 
-from mjchair.diagnosis import rules
 from mjchair.diagnosis.data.windows import calm
-from mjchair.diagnosis.explain import hypotheses, noise_shown, whole_sizes
+from mjchair.diagnosis.explain import hypotheses, noise_shown, search_rules, whole_sizes
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.fits import Fits, believable
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
@@ -88,7 +87,7 @@ def without_hidden(fits: Fits) -> Fits:
 
 def _grown(base: Base, here: Explained) -> Explained:
     """The explanation with as many further effects as are more probable than noise."""
-    while len(here.starts) < rules.MOST and noise_shown.loudness(here.bench) > LOUD:
+    while len(here.starts) < search_rules.MOST and noise_shown.loudness(here.bench) > LOUD:
         further = _further(base, here)
         if further is None:
             break
@@ -116,7 +115,7 @@ def _first(fits: Fits) -> Explained:
     base = fits.base
     known = [_left(base, (), base.plain)]
     best = best_single(fits)
-    tried = fits.fit(best) if best and best.gain > rules.needed(best.free) else None
+    tried = fits.fit(best) if best and best.gain > search_rules.needed(best.free) else None
     fitted = fits.anew(tried) if tried else None
     if best and fitted:
         known.append(_left(base, best.starts, fitted))
@@ -153,7 +152,7 @@ def _promising(base: Base, here: Explained, reduced: Reduced) -> list[tuple[Hypo
     taken = {s.effect.key for s in here.starts}
     free = [s for s in base.starts if s.effect.key not in taken]
     options = hypotheses.singles(reduced, free)[:LOOKED]
-    if len(here.starts) + 2 <= rules.MOST:
+    if len(here.starts) + 2 <= search_rules.MOST:
         options += hypotheses.pairs(reduced, free)[:LOOKED]
     own = effects_of(base, here.fitted)
     weighed = []
@@ -199,7 +198,7 @@ def _beyond_form(reduced: Reduced, more: Hypothesis, gain: float) -> bool:
     """
     fewer = [hypotheses.weigh(reduced, [s for s in more.starts if s is not own]).gain
              for own in more.starts]  # fmt: skip
-    return all(rules.beyond_form(own=more.gain - less, gain=gain) for less in fewer)
+    return all(search_rules.beyond_form(own=more.gain - less, gain=gain) for less in fewer)
 
 
 def _fitted(
@@ -255,4 +254,4 @@ def _around(base: Base, bench: Bench, fitted: Fitted) -> Reduced:
 def _penalty(starts: Sequence[Start]) -> float:
     """What effects must earn besides their parameters, which the deviance prices."""
     prior = Hypothesis(tuple(starts), 0.0, 0.0).prior
-    return rules.WORTH * len(starts) - prior
+    return search_rules.WORTH * len(starts) - prior

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.column_ids import EffectColumn
+from mjchair.diagnosis.explain.search_rules import MOST, PENALTY
 from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.fit.variant import Term
-from mjchair.diagnosis.rules import MOST, PENALTY
 
 Array = NDArray[np.float64]
 SHORTLIST = 60

@@ -12,8 +12,7 @@ from operator import attrgetter
 
 import numpy as np
 
-from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import hypotheses
+from mjchair.diagnosis.explain import hypotheses, search_rules
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.near_fit import NearFit
 from mjchair.diagnosis.explain.screening import Base, Say, gain, goes_far, silent, starting_variant
@@ -67,7 +66,7 @@ class MultiStart:
         if self.near is not None:
             return self._or_from_afar(first)
         many = len(self.hypothesis.starts) > 1 and self.best is not None  # one start is enough
-        short = first is None or rules.fell_short(
+        short = first is None or search_rules.fell_short(
             total=first.total, promised=self._promised, gain=self.hypothesis.gain
         )
         if first is not None and (many or not short or self._is_hopeless(first)):
@@ -78,7 +77,7 @@ class MultiStart:
             return first
         second = self._followed(other)
         fits = [f for f in (first, second) if f is not None]
-        if len(fits) > 1 and rules.starts_disagree(fits[0].total, fits[1].total):
+        if len(fits) > 1 and search_rules.starts_disagree(fits[0].total, fits[1].total):
             ends = " and ".join(f"{f.total:.0f}" for f in fits)
             names = self.hypothesis.label
             self.note(f"fits of {names} from two starts end at chi2 of {ends}; the less is used")
@@ -92,8 +91,8 @@ class MultiStart:
         has left that valley.
         """
         if near is not None and gain(self.base, near) >= 0.0:
-            better = self.part is not None and self.part.total - near.total > rules.WORTH
-            if better or not rules.is_stuck(total=near.total, promised=near.promised):
+            better = self.part is not None and self.part.total - near.total > search_rules.WORTH
+            if better or not search_rules.is_stuck(total=near.total, promised=near.promised):
                 return near
         afar = replace(self, near=None)
         return _better(near, afar._followed(afar._begun(1.0)))
@@ -119,7 +118,7 @@ class MultiStart:
         effects that linear algebra hardly tells apart, only one may have come to the deeper one.
         """
         best = self.best
-        if best is None or not rules.ends_elsewhere(
+        if best is None or not search_rules.ends_elsewhere(
             behind=np.inf if fitted is None else fitted.total - best.total,
             promised=self.behind,
             gain=gain(self.base, best),
@@ -170,7 +169,7 @@ class MultiStart:
             return fitted  # what it would gain if all were made anew decides nothing
         if goes_far(fitted):
             return self._around_terms(fitted)
-        if rules.is_stuck(total=fitted.total, promised=fitted.promised):
+        if search_rules.is_stuck(total=fitted.total, promised=fitted.promised):
             return made_anew(self.base.bench, fitted.variant, fitted.track) or fitted
         return fitted
 
@@ -237,7 +236,7 @@ class MultiStart:
         base, best = self.base, self.best
         if best is None or not self._is_behind(fitted):
             return False
-        return not rules.may_be_as_good(
+        return not search_rules.may_be_as_good(
             promised=self.behind,
             behind=self._promised - best.total,
             gain=self.hypothesis.gain,
@@ -248,7 +247,7 @@ class MultiStart:
         """Chi2 that a fit must promise to come near the best."""
         if self.best is None:
             return np.inf
-        return rules.reach(best=self.best.total, gain=gain(self.base, self.best))
+        return search_rules.reach(best=self.best.total, gain=gain(self.base, self.best))
 
     def _around_terms(self, fitted: Fitted) -> Fitted:
         """The fit from the effects that were reached, what is roughly known as given; the better.
@@ -262,7 +261,7 @@ class MultiStart:
             again = made_anew(self.base.bench, start, fitted.track, reach=self._reach())
             if again is None:
                 return fitted
-            if fitted.total - again.total < rules.WORTH:
+            if fitted.total - again.total < search_rules.WORTH:
                 if start is fitted.variant and not self._is_behind(again):
                     fitted.anew = again  # nobody need make it a second time
                 return min(fitted, again, key=attrgetter("total"))

@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import event, hypotheses
+from mjchair.diagnosis.explain import event, hypotheses, search_rules
 from mjchair.diagnosis.explain.choice import Choice
 from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
@@ -68,7 +67,7 @@ def is_clear(base: Base, gap: Gap) -> bool:
     best = acting.options[0]
     everywhere = best_of_sizes(base.reduced, base.starts)
     by = best.score - max((h.score for h in everywhere), default=0.0)
-    clearly = rules.is_clearly_of_one_run(by=by, gain=best.gain, excess=gap.excess)
+    clearly = search_rules.is_clearly_of_one_run(by=by, gain=best.gain, excess=gap.excess)
     return clearly and event.largest(base).gain <= best.gain
 
 
@@ -85,15 +84,17 @@ def in_one_run(base: Base, gap: Gap, choice: Choice | None) -> InOneRun | None:
     best = acting.options[0]
     by = price - (base.reduced.total - best.score)
     brings, others = base.plain.total - base.reduced.total + best.gain, gain(base, fitted)
-    sure = rules.is_of_one_run(by=by, gain=best.gain)
+    sure = search_rules.is_of_one_run(by=by, gain=best.gain)
     if event.largest(base).gain > brings:
         return None
     fewer = choice is not None and best.free < choice.hypothesis.free
-    rival = rules.fits_alike_in_one_run(by=by, fewer=fewer)
+    rival = search_rules.fits_alike_in_one_run(by=by, fewer=fewer)
     excess = max(gap.excess, others)
-    if not (sure or rival or rules.may_be_of_one_run(by=by, gain=brings, excess=excess)):
+    if not (sure or rival or search_rules.may_be_of_one_run(by=by, gain=brings, excess=excess)):
         return None
-    alike = [h for h in acting.options if best.gain - h.gain < rules.not_ruled_out(gain=best.gain)]
+    alike = [
+        h for h in acting.options if best.gain - h.gain < search_rules.not_ruled_out(gain=best.gain)
+    ]
     return InOneRun(
         trial=base.bench.simulator.study.runs[acting.run].trial.name,
         acting=acting,
@@ -118,7 +119,9 @@ def _ruled_out_elsewhere(base: Base) -> ActingIn | None:
         return None
     everywhere = {h.name: h.score for h in hypotheses.singles(base.reduced, base.starts)}
     options = [
-        h for h in acting.options if h.score > max(everywhere.get(h.name, 0.0), 0.0) + rules.TIE
+        h
+        for h in acting.options
+        if h.score > max(everywhere.get(h.name, 0.0), 0.0) + search_rules.TIE
     ]
     return replace(acting, options=options) if options else None
 

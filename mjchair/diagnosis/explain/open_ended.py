@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import search_rules
 from mjchair.diagnosis.explain.screening import Base, gain, nuisances_of
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted, refit
@@ -59,12 +59,12 @@ def _with_least(
       looked: the effect, its size, and a far larger one.
     """
     term, p, far = looked
-    ruled_out = best.total + rules.not_ruled_out(gain=gain(base, best))
+    ruled_out = best.total + search_rules.not_ruled_out(gain=gain(base, best))
     if _at(base, fitted, _held(term, p, far), ruled_out) is None:
         return fitted
     smallest = p.neutral + SMALLEST * (term.values[p.name] - p.neutral)
     ends, _ = _least(base, fitted, term, p, (smallest, ruled_out))
-    least, there = _least(base, fitted, term, p, (ends, best.total + rules.TIE))
+    least, there = _least(base, fitted, term, p, (ends, best.total + search_rules.TIE))
     at = fitted if there is None else _freed(base, there, term)
     key = ParameterId(term.effect.key, p.name)
     opened = {k: fitted.std[k] for k in fitted.at_least}

@@ -13,8 +13,7 @@ and brings 1339, more than that gain with the drag of the air.
 
 from __future__ import annotations
 
-from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import hypotheses
+from mjchair.diagnosis.explain import hypotheses, search_rules
 from mjchair.diagnosis.explain.choice import Choice, Tried
 from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
@@ -60,6 +59,6 @@ def _may_be_better(single: Hypothesis, singles: list[Hypothesis], choice: Choice
     chosen, best = choice.hypothesis, singles[0]
     if len(chosen.starts) == 1 or single.name in chosen.keys:
         return False
-    return rules.is_just_behind(gain=single.gain, best=chosen.gain) or rules.worth_trying(
-        score=single.score, best=best.score, gain=best.gain
-    )
+    return search_rules.is_just_behind(
+        gain=single.gain, best=chosen.gain
+    ) or search_rules.worth_trying(score=single.score, best=best.score, gain=best.gain)

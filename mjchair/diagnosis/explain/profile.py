@@ -28,7 +28,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import search_rules
 from mjchair.diagnosis.explain.multistart import made_anew
 from mjchair.diagnosis.explain.screening import Base, nuisances_of
 from mjchair.diagnosis.fit.column_ids import ParameterId
@@ -67,7 +67,7 @@ def followed(base: Base, fitted: Fitted) -> Fitted:
     not stuck, of whose sizes none makes up for another, and whose two sides say the same, comes
     back as it is.
     """
-    stuck = rules.is_stuck(total=fitted.total, promised=fitted.promised)
+    stuck = search_rules.is_stuck(total=fitted.total, promised=fitted.promised)
     sizes = _sizes(fitted)
     if not sizes:
         return fitted
@@ -84,14 +84,14 @@ def followed(base: Base, fitted: Fitted) -> Fitted:
         held = [h for h in (_held(base, path[-1], *s, away) for s in sides) if h is not None]
         seen += held
         least = min(held, key=lambda h: h.fitted.total, default=None)
-        if least is None or least.fitted.total >= path[-1].total + rules.TIE:
+        if least is None or least.fitted.total >= path[-1].total + search_rules.TIE:
             break
         freed = _freed(base, least.fitted, fitted)
         if freed is None or freed.total >= path[-1].total:
             break
         path.append(_widened(freed, _two_sided(base, freed)))
         sides, away = [(least.key, least.side)], FARTHER * away
-    alike = path[-1].total + rules.TIE
+    alike = path[-1].total + search_rules.TIE
     return _with_errors(next(f for f in path if f.total <= alike), path[-1], seen)
 
 

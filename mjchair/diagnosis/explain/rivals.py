@@ -14,6 +14,7 @@ from operator import attrgetter, itemgetter
 import numpy as np
 
 from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import search_rules
 from mjchair.diagnosis.explain.backward_elimination import without_needless
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Choice, Tried, is_pushed, is_there
@@ -68,7 +69,7 @@ def better_of(fits: Fits, chosen: Tried, rivals: Sequence[tuple[Tried, float]]) 
             for t, fitted in zip((chosen, rival), made, strict=True)
         )
         more_common = rival.hypothesis.prior - chosen.hypothesis.prior
-        return rules.counts(mine - theirs, gain=own) + more_common
+        return search_rules.counts(mine - theirs, gain=own) + more_common
 
     near = [(r, g) for r, g in rivals if believable(r.fitted) and ahead(r, g, False) > -NEAR]
     found = [(ahead(r, g, True), r) for r, g in near]
@@ -84,7 +85,9 @@ def rivals_of(fits: Fits, chosen: Tried) -> list[list[Tried]]:
     that chair itself is far from where its fit leads.
     """
     own = own_gains(fits, chosen)
-    coarse = rules.is_coarse(overstated=overstated(fits.base), gain=gain(fits.base, chosen.fitted))
+    coarse = search_rules.is_coarse(
+        overstated=overstated(fits.base), gain=gain(fits.base, chosen.fitted)
+    )
     out = []
     for start, brought in zip(chosen.hypothesis.starts, own, strict=True):
         around_base = brought == max(own) and not coarse
@@ -122,7 +125,9 @@ def _rivals(fits: Fits, chosen: Tried, start: Start, own: float) -> list[Tried]:
     # the first is always fitted: by linear algebra a payload of 25 kg brings 53 of 1015 less than
     # torque gains 13 % low, and once it is fitted it brings 47 more
     if not near:
-        near = [h for h in options[:1] if rules.may_be_alike(less=here.gain - h.gain, own=own)]
+        near = [
+            h for h in options[:1] if search_rules.may_be_alike(less=here.gain - h.gain, own=own)
+        ]
     tried = [fits.fit(h, chosen) for h in near[: REFITTED if not others else BESIDE]]
     tried += _in_place_of(fits.tried, chosen.hypothesis, start, [h.keys for h in near])
     return [
@@ -141,7 +146,7 @@ def _close(chosen: Hypothesis, other: Hypothesis, own: float) -> bool:
       own: chi2 that the effect brings in whose place it would stand.
     """
     behind, less = chosen.score - other.score, chosen.gain - other.gain
-    return rules.worth_refitting(behind=behind, gain=own, rival_gain=own - less)
+    return search_rules.worth_refitting(behind=behind, gain=own, rival_gain=own - less)
 
 
 def _in_place_of(
@@ -265,10 +270,10 @@ def _not_ruled_out(rival: Tried, chosen: Tried, brought: float, harm: float = 0.
     most = int(np.argmax(difference))
     cases = ((behind, difference), (behind - difference[most], np.delete(difference, most)))
     return all(
-        rules.stays_a_rival(
+        search_rules.stays_a_rival(
             behind=by,
             gain=brought,
-            errors=rules.paired_errors(by, left),
+            errors=search_rules.paired_errors(by, left),
             harm=harm,
             beyond_bound=bool(rival.fitted.at_bound and not chosen.fitted.at_bound),
         )

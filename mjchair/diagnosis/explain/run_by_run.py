@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mjchair.diagnosis import rules
+from mjchair.diagnosis.explain import search_rules
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted
@@ -59,7 +59,7 @@ def uneven(bench: Bench, fitted: Fitted, brought: dict[str, float]) -> list[Unev
         if not sized:
             continue
         gained, free, sizes = _freed(bench, fitted.system, term, sized)
-        if rules.differs_by_run(
+        if search_rules.differs_by_run(
             gained=gained, free=free, brought=brought.get(term.effect.key, 0.0)
         ):
             name, runs = max(sizes.items(), key=lambda item: _spread(item[1]))

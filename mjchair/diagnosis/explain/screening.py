@@ -16,7 +16,13 @@ from mjchair.diagnosis import rules
 from mjchair.diagnosis.data import first_state, roughly_known
 from mjchair.diagnosis.data.study import Study, with_copied_wheels
 from mjchair.diagnosis.data.windows import calm, shimmying
-from mjchair.diagnosis.explain import candidates, hypotheses, missing_force, noise_shown
+from mjchair.diagnosis.explain import (
+    candidates,
+    hypotheses,
+    missing_force,
+    noise_shown,
+    search_rules,
+)
 from mjchair.diagnosis.explain import gap as gaps
 from mjchair.diagnosis.explain.candidates import Around, Start
 from mjchair.diagnosis.explain.gap import Gap
@@ -268,7 +274,7 @@ def _first_that_holds(
     what linear algebra puts on a bound waits, and is fitted only where it promises less than what
     holds without it leaves.
     """
-    worth = [h for h in options[:TRIED] if h.gain > rules.needed(h.free)]
+    worth = [h for h in options[:TRIED] if h.gain > search_rules.needed(h.free)]
     far = {h.name for h in worth if any(map(on_bound, hypotheses.terms(reduced, h)))}
     made: list[tuple[float, Found]] = []
     inside = _holding(base, bench, reduced, [h for h in worth if h.name not in far], made)
@@ -281,7 +287,9 @@ def _first_that_holds(
 
 def _promises_more(reduced: Reduced, h: Hypothesis, found: Found | None) -> bool:
     """Whether a hypothesis promises to leave clearly less than what was found leaves."""
-    return found is None or reduced.total - h.gain + rules.needed(h.free) < found.fitted.total
+    return (
+        found is None or reduced.total - h.gain + search_rules.needed(h.free) < found.fitted.total
+    )
 
 
 def _holding(
@@ -300,7 +308,7 @@ def _holding(
     for h in options:
         start = starting_variant(base, reduced, h)
         start = replace(start, terms=_off_bounds(start.terms, ended))
-        reach = rules.short_of(promised=reduced.total - h.gain, gain=h.gain)
+        reach = search_rules.short_of(promised=reduced.total - h.gain, gain=h.gain)
         try:
             fitted = refit(
                 bench,
@@ -314,7 +322,7 @@ def _holding(
         except (MjchairError, np.linalg.LinAlgError):
             continue  # these effects this chair cannot have
         found = Found(h.starts, fitted)
-        settled = rules.has_settled(total=fitted.total, promised=fitted.promised)
+        settled = search_rules.has_settled(total=fitted.total, promised=fitted.promised)
         pushed = fitted.at_bound or bounded.at_walls(fitted.variant.offsets)
         if settled and fitted.total < reach and not pushed:
             return found
@@ -410,7 +418,7 @@ def gain(base: Base, fitted: Fitted) -> float:
 def reaches(base: Base, fitted: Fitted) -> bool:
     """Whether a fit gets to what its own step promises; one that does not is judged as it is."""
     gained = gain(base, fitted)
-    return rules.reaches(total=fitted.total, promised=fitted.promised, gain=gained)
+    return search_rules.reaches(total=fitted.total, promised=fitted.promised, gain=gained)
 
 
 def overstated(base: Base) -> float:

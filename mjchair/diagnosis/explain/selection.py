@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import one_run
+from mjchair.diagnosis.explain import one_run, search_rules
 from mjchair.diagnosis.explain.backward_elimination import without_needless
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Choice, Tried
@@ -56,7 +56,7 @@ def plain_from(base: Base, fitted: Fitted) -> Fitted | None:
     """
     start = replace(fitted.variant, terms=())
     plain = made_anew(base.bench, start, fitted.track, nuisances_of(base, fitted))
-    if plain is None or base.plain.total - plain.total <= rules.WORTH:
+    if plain is None or base.plain.total - plain.total <= search_rules.WORTH:
         return None
     return plain
 
@@ -108,7 +108,7 @@ def _with_both_sides(fits: Fits, best: Tried) -> Tried:
     with fits.near_to(best):
         both = freed(fits, best.hypothesis)
         tried = None if both.free == best.hypothesis.free else fits.fit(both, best)
-    if tried is not None and tried.fitted.total <= best.fitted.total + rules.NOTHING:
+    if tried is not None and tried.fitted.total <= best.fitted.total + search_rules.NOTHING:
         best = tried
     richer = _with_more(fits, best)
     if not richer:
@@ -141,7 +141,7 @@ def _is_unclear(fits: Fits, best: Tried, start: Start, more: Start) -> bool:
     """
     starts = best.hypothesis.starts
     others = tuple(s for s in starts if s is not start)
-    return fits.weigh((*others, more)).gain < fits.weigh(starts).gain - rules.NOTHING
+    return fits.weigh((*others, more)).gain < fits.weigh(starts).gain - search_rules.NOTHING
 
 
 def _freed_in_place(fits: Fits, best: Tried, start: Start, more: Start) -> Tried | None:
@@ -159,7 +159,7 @@ def _freed_in_place(fits: Fits, best: Tried, start: Start, more: Start) -> Tried
         replace(t, free=more.free) if t.effect.key == key else t for t in chosen.variant.terms
     )
     made = made_anew(fits.base.bench, replace(chosen.variant, terms=terms), chosen.track)
-    if made is None or not rules.alike(-made.total, -chosen.total):
+    if made is None or not search_rules.alike(-made.total, -chosen.total):
         return None
     (term,) = (t for t in made.variant.terms if t.effect.key == key)
     if any(

@@ -11,8 +11,7 @@ from itertools import islice
 
 import numpy as np
 
-from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import hypotheses
+from mjchair.diagnosis.explain import hypotheses, search_rules
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Tried
 from mjchair.diagnosis.explain.fits import Fits
@@ -63,7 +62,7 @@ def promising(fits: Fits, best: Tried) -> list[Hypothesis]:
     return [
         more
         for more in with_one_more(fits, best.hypothesis.starts)
-        if rules.may_be_worth_adding(
+        if search_rules.may_be_worth_adding(
             promised=more.gain - here.gain,
             parameters=more.free - here.free,
             gain=more.gain,
@@ -113,7 +112,9 @@ def _first_few(fits: Fits, options: Sequence[Hypothesis], coarse: bool) -> list[
         h
         for h in options
         if h.keys != first.keys
-        and rules.worth_trying(score=h.score, best=first.score, gain=first.gain, coarse=coarse)
+        and search_rules.worth_trying(
+            score=h.score, best=first.score, gain=first.gain, coarse=coarse
+        )
     ]
     return [first, *near[: (LISTED if coarse else TRIED) - 1]]
 
@@ -127,7 +128,7 @@ def is_worth(fits: Fits, best: Tried, more: Tried) -> bool:
     """Whether a larger hypothesis brings enough; both with everything made anew."""
     base, one, other = fits.base, fits.anew(best), fits.anew(more)
     held = held_out(base.bench, with_terms(base, one), with_terms(base, other))
-    return rules.worth_adding(
+    return search_rules.worth_adding(
         gained=one.total - other.total,
         parameters=more.hypothesis.free - best.hypothesis.free,
         held=held,
@@ -138,7 +139,7 @@ def is_worth(fits: Fits, best: Tried, more: Tried) -> bool:
 def _commonest(fits: Fits, options: Sequence[Hypothesis]) -> Hypothesis:
     """Of the hypotheses that fit alike, the one whose effects stand first in the library."""
     order = {s.effect.key: k for k, s in reversed(list(enumerate(fits.base.starts)))}
-    alike = [h for h in options if rules.alike(h.score, options[0].score)]
+    alike = [h for h in options if search_rules.alike(h.score, options[0].score)]
     return freed(fits, min(alike, key=lambda h: sorted(order[k] for k in h.keys)))
 
 
@@ -161,7 +162,7 @@ def _freed(fits: Fits, hypothesis: Hypothesis, start: Start) -> Hypothesis:
     alike = {
         column
         for columns, h in weighed.items()
-        if len(columns) <= len(start.columns) and rules.alike(h.score, hypothesis.score)
+        if len(columns) <= len(start.columns) and search_rules.alike(h.score, hypothesis.score)
         for column in columns
     }
     richer = [c for c in weighed if alike <= set(c)]

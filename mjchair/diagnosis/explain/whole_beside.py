@@ -16,9 +16,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
-from mjchair.diagnosis import rules
 from mjchair.diagnosis.data.windows import calm
-from mjchair.diagnosis.explain import hypotheses, whole_sizes
+from mjchair.diagnosis.explain import hypotheses, search_rules, whole_sizes
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.multistart import made_anew
@@ -42,7 +41,7 @@ def fits(base: Base, single: Fitted, best: Fitted) -> Iterator[tuple[tuple[Start
     around = base.around
     nothing = _with_best(base, windows, base.starts, around.variant, around.track).chi2
     most = nothing - whole_sizes.chi2(base, best.variant, best.track, windows)
-    reach = rules.reach_of_whole(best=best.total, gain=gain(base, best))
+    reach = search_rules.reach_of_whole(best=best.total, gain=gain(base, best))
     for start in whole_sizes.starts(base):
         others = [s for s in base.starts if s.effect.key != start.effect.key]
         weigh = partial(_with_best, base, windows, others)

@@ -22,6 +22,7 @@ import numpy as np
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.data.shimmy import CASTERS
 from mjchair.diagnosis.data.windows import shimmying
+from mjchair.diagnosis.explain import search_rules
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.multistart import made_anew
 from mjchair.diagnosis.explain.screening import Base, gain
@@ -82,7 +83,7 @@ def fits(base: Base, other: Fitted | None = None) -> Iterator[tuple[Start, Fitte
     most, reach = 0.0, np.inf
     if other is not None and shimmies_as_measured(base, other.track):
         most = nothing - chi2(base, other.variant, other.track, windows)
-        reach = rules.reach_of_whole(best=other.total, gain=gain(base, other))
+        reach = search_rules.reach_of_whole(best=other.total, gain=gain(base, other))
 
     def weigh(variant: Variant, here: Track) -> Seen:
         return Seen(chi2(base, variant, here, windows), variant)
@@ -154,7 +155,7 @@ def compared(base: Base, fitted: Fitted) -> Fitted:
     if len(fits) == 1:
         return fitted
     best = min(fits, key=lambda f: f.total)
-    most = rules.not_ruled_out(gain=gain(base, best))
+    most = search_rules.not_ruled_out(gain=gain(base, best))
     near = [f for f in fits if f.total - best.total < most]
     std, sigmas = dict(best.std), dict(best.sigmas)
     for k, term, p in _whole(best):
@@ -223,7 +224,7 @@ def best_sizes(
                 add(size)
             best = min(best, *near, key=totals.__getitem__)
         ends.append(best)
-    least = max(rules.needed(len(start.free)), rules.REPLACES * most)
+    least = max(search_rules.needed(len(start.free)), rules.REPLACES * most)
     return [seen[size] for size in ends if nothing - totals[size] > least]
 
 
