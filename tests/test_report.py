@@ -43,7 +43,6 @@ from mjchair.diagnosis.result import (
 from mjchair.diagnosis.rules import Verdict
 from mjchair.effects.effect import SensorError
 from mjchair.effects.library import find
-from mjchair.report import diagnosis_words as words
 from mjchair.report.diagnosis_figures import (
     candidates,
     gap,
@@ -54,6 +53,7 @@ from mjchair.report.diagnosis_figures import (
     whole_runs,
 )
 from mjchair.report.diagnosis_page import figures, page
+from mjchair.report.diagnosis_words import explanations, first_screen, sections
 
 ROLLING = NamedEffect(
     name="rolling_resistance",
@@ -207,14 +207,14 @@ def test_no_share_of_a_gap_is_shown_where_there_is_none():
 
 def test_it_is_said_why_what_fits_is_not_named():
     open_sets = dataclasses.replace(diagnosis(Verdict.AMBIGUOUS), alternatives=[["toe", "wind"]])
-    assert words.choice_words(open_sets).endswith("Another of its set fits about as well.")
+    assert sections.choice_words(open_sets).endswith("Another of its set fits about as well.")
     (effect, *_) = open_sets.effects
     rare = dataclasses.replace(
         open_sets, alternatives=[], effects=[effect], probability={effect.key: 0.21}
     )
-    assert words.choice_words(rare).endswith("Its probability is 21 %, below 95 %.")
+    assert sections.choice_words(rare).endswith("Its probability is 21 %, below 95 %.")
     left = dataclasses.replace(rare, probability={effect.key: 0.97})
-    assert "not enough to name it" in words.choice_words(left)
+    assert "not enough to name it" in sections.choice_words(left)
 
 
 def test_noise_that_is_larger_than_the_study_says_is_told(monkeypatch):
@@ -245,34 +245,38 @@ def test_what_acts_in_one_run_alone_is_said_with_the_run_and_the_sizes():
     brake = NamedEffect(name="bearing_friction", parameters={"left": rubs}, closure=1.0)
     one = OneRun(trial="coast_2", effects=(brake,), gain=189.0, others=184.0)
     found = dataclasses.replace(diagnosis(Verdict.UNKNOWN), one_run=one)
-    said = words.missing(found)
+    said = first_screen.missing(found)
     assert said.startswith("coast_2 differs from the other runs")  # a name keeps its letters
     assert "left 0.580 ± 0.040 N m" in said and said.endswith("so nothing is named.")
-    assert "coast_2" in words.choice_words(found) and "nearest" not in words.choice_words(found)
+    assert "coast_2" in sections.choice_words(found) and "nearest" not in sections.choice_words(
+        found
+    )
     html = page(found, {})
     assert html.count("coast_2 differs from the other runs: <b>bearing friction</b>") == 2
 
 
 def test_what_the_corrected_chair_has_besides_is_to_be_measured_first():
     found = diagnosis()
-    assert words.next_step(found) == "These data decide; use the corrected chair (model.xml)."
+    assert (
+        first_screen.next_step(found) == "These data decide; use the corrected chair (model.xml)."
+    )
     heavier = (Moved(name="mass", std=0.3, unit="1", by=1.27),)
     much = dataclasses.replace(
         found, evidence=dataclasses.replace(found.evidence, moved=heavier), next_experiment=""
     )
-    assert "the mass of chair and person together by +38 % besides" in words.next_step(much)
+    assert "the mass of chair and person together by +38 % besides" in first_screen.next_step(much)
 
 
 def test_one_run_is_not_called_several():
     found = diagnosis()
     one = dataclasses.replace(found.evidence, trials=found.evidence.trials[1:2])
     alone = dataclasses.replace(found, evidence=one)
-    assert "parts of the run that it was not fitted to" in words.choice_words(alone)
-    assert "holds on runs that it was not fitted to" in words.choice_words(found)
+    assert "parts of the run that it was not fitted to" in sections.choice_words(alone)
+    assert "holds on runs that it was not fitted to" in sections.choice_words(found)
 
 
 def test_a_named_effect_comes_with_value_and_uncertainty():
-    said = words.missing(Diagnosis(verdict=Verdict.NAMED, effects=[ROLLING]))
+    said = first_screen.missing(Diagnosis(verdict=Verdict.NAMED, effects=[ROLLING]))
     assert (
         said
         == "The model of the chair lacks **rolling resistance** (coefficient 0.01460 ± 0.00040)."
@@ -284,7 +288,7 @@ def test_what_a_correction_leaves_is_told_apart_from_what_is_only_roughly_known(
         gap = GapSummary(before=9.0, after=after, scope="held-out trials", p_value=0.0,
                          p_value_after=0.3, unforeseen=unforeseen)  # fmt: skip
         found = Diagnosis(verdict=Verdict.NAMED, effects=[ROLLING], gap=gap)
-        return words.unforeseen_words(found)
+        return first_screen.unforeseen_words(found)
 
     assert "Of the 2.7 times the noise" in said(2.7, 1.1) and "all but 1.1" in said(2.7, 1.1)
     assert said(2.7, 2.6) == said(1.2, 0.9) == said(2.7, None) == ""
@@ -307,10 +311,10 @@ def test_a_sensor_at_fault_is_no_lack_of_the_chair(name, parameter, value, unit,
         channel="heading",
     )
     alone = Diagnosis(verdict=Verdict.NAMED, effects=[fault])
-    assert words.missing(alone).startswith(f"The sensor of heading {said}")
-    assert words.next_step(alone).endswith("the chair lacks nothing.")
+    assert first_screen.missing(alone).startswith(f"The sensor of heading {said}")
+    assert first_screen.next_step(alone).endswith("the chair lacks nothing.")
     left = dataclasses.replace(alone, more_missing=True)
-    assert words.next_step(left).endswith("correct what the sensor shows.")
+    assert first_screen.next_step(left).endswith("correct what the sensor shows.")
     late = NamedEffect(
         name="torque_delay",
         parameters={},
@@ -319,12 +323,14 @@ def test_a_sensor_at_fault_is_no_lack_of_the_chair(name, parameter, value, unit,
         recording=True,
     )
     alone = Diagnosis(verdict=Verdict.NAMED, effects=[late])
-    assert words.missing(alone) == "The torques came late (**torque delay**)."
-    assert words.next_step(alone).endswith("correct what was recorded; the chair lacks nothing.")
+    assert first_screen.missing(alone) == "The torques came late (**torque delay**)."
+    assert first_screen.next_step(alone).endswith(
+        "correct what was recorded; the chair lacks nothing."
+    )
     both = Diagnosis(verdict=Verdict.NAMED, effects=[fault, ROLLING])
-    assert "The model of the chair lacks **rolling resistance** (" in words.missing(both)
-    assert f"), and the sensor of heading {said}" in words.missing(both)
-    assert "model.xml" in words.next_step(both)
+    assert "The model of the chair lacks **rolling resistance** (" in first_screen.missing(both)
+    assert f"), and the sensor of heading {said}" in first_screen.missing(both)
+    assert "model.xml" in first_screen.next_step(both)
 
 
 def test_what_is_named_beside_more_that_is_missing_is_no_last_word():
@@ -334,19 +340,23 @@ def test_what_is_named_beside_more_that_is_missing_is_no_last_word():
         gap=GapSummary(before=3.0, after=0.9, scope="", p_value=0.0, p_value_after=0.5),
         more_missing=True,
     )
-    assert "look for what is left" in words.next_step(found)
-    assert "of the gap; a remainder is left. The model of the chair lacks" in words.missing(found)
+    assert "look for what is left" in first_screen.next_step(found)
+    assert "of the gap; a remainder is left. The model of the chair lacks" in first_screen.missing(
+        found
+    )
     found.gap = dataclasses.replace(found.gap, scope="held-out trials")
     falls = "of the gap in the runs of the fit (from 3.0 to 0.9 times the noise in those held out)"
-    assert f"{falls}; a remainder is left. " in words.missing(found)
+    assert f"{falls}; a remainder is left. " in first_screen.missing(found)
     found.gap = dataclasses.replace(found.gap, after=2.95)
-    assert "of the fit (those held out stay at 3.0 times the noise); a" in words.missing(found)
+    assert "of the fit (those held out stay at 3.0 times the noise); a" in first_screen.missing(
+        found
+    )
     found.gap = dataclasses.replace(found.gap, scope="", after=0.9)
     found.correction = Variant((), {"mass": -3.0, "centre_x": 2.0})
     said = "only with a chair at the end of what the study allows (the mass of chair and person "
-    assert f"gap, and {said}together). The model" in words.missing(found)
+    assert f"gap, and {said}together). The model" in first_screen.missing(found)
     found.gap = dataclasses.replace(found.gap, after=1.3)
-    assert "together); a remainder is left. The model" in words.missing(found)
+    assert "together); a remainder is left. The model" in first_screen.missing(found)
 
 
 def test_how_probable_a_lone_effect_is_stands_in_the_first_sentence():
@@ -355,16 +365,18 @@ def test_how_probable_a_lone_effect_is_stands_in_the_first_sentence():
         effects=[ROLLING],
         probability={"rolling_resistance": 0.8, "rolling_resistance+toe": 0.07, "none": 0.13},
     )
-    said = words.missing(found)
+    said = first_screen.missing(found)
     assert said.startswith("Probably (87 %), the model of the chair lacks **rolling resistance** (")
     assert said.endswith("; these runs are not enough to name it.")
     found.probability = {"rolling_resistance": 0.4, "outside": 0.6}
-    assert "the evidence is thin" in words.missing(found)
+    assert "the evidence is thin" in first_screen.missing(found)
 
 
 def test_rivals_are_in_the_first_sentence():
     sets = [["floor_slope", "rolling_resistance"]]
-    said = words.missing(Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets))
+    said = first_screen.missing(
+        Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets)
+    )
     assert said == (
         "It is **floor slope** or **rolling resistance**, and these runs cannot tell "
         "which. The corrected chair has **rolling resistance** (coefficient 0.01460 ± 0.00040)."
@@ -375,25 +387,28 @@ def test_a_correction_that_is_less_probable_than_a_rival_says_why():
     sets = [["rolling_resistance", "toe"]]
     found = Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets)
     found.probability = {"toe": 0.41, "rolling_resistance": 0.16, "rolling_resistance+wind": 0.02}
-    said = words.missing(found)
+    said = first_screen.missing(found)
     assert said.endswith("), with which it fits best, though toe is more probable.")
-    assert "Toe is more probable (41 % against 18 %) though it" in words.choice_words(found)
+    assert "Toe is more probable (41 % against 18 %) though it" in sections.choice_words(found)
     found.probability["sensor_bias:heading+wind"] = 0.5
-    said = words.missing(found)
+    said = first_screen.missing(found)
     assert said.endswith(", though sensor bias of heading and wind are more probable.")
     del found.probability["sensor_bias:heading+wind"]
     found.probability = {"rolling_resistance": 0.41, "toe": 0.18, "outside": 0.1}
-    assert "more probable" not in words.missing(found)
+    assert "more probable" not in first_screen.missing(found)
     found.probability = {"outside": 0.41, "rolling_resistance": 0.18}
-    assert "more probable" not in words.missing(found)
+    assert "more probable" not in first_screen.missing(found)
 
 
 def test_alternatives_that_go_together_are_said_to():
     sets = [["rolling_resistance", "toe+air_drag", "none"]]
     found = Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets)
-    said = words.missing(found)
+    said = first_screen.missing(found)
     assert "is **rolling resistance**, **toe** with **air drag** or nothing, and these" in said
-    assert words.settled(dataclasses.replace(found, probability={"rolling_resistance": 1.0})) == []
+    assert (
+        explanations.settled(dataclasses.replace(found, probability={"rolling_resistance": 1.0}))
+        == []
+    )
 
 
 def test_several_effects_that_have_rivals_are_each_told_from_theirs():
@@ -408,7 +423,7 @@ def test_several_effects_that_have_rivals_are_each_told_from_theirs():
             ["rolling_resistance", "toe", "event"],
         ],
     )
-    chair, cannot = words.missing(found).split(". But these runs cannot tell ")
+    chair, cannot = first_screen.missing(found).split(". But these runs cannot tell ")
     assert (
         chair.startswith("The corrected chair has **rolling resistance** (")
         and BIAS.channel in chair
@@ -417,7 +432,7 @@ def test_several_effects_that_have_rivals_are_each_told_from_theirs():
         "**rolling resistance** from **toe** or something that happened once; nor **sensor bias** "
         "from nothing; nor **rolling resistance** with **sensor bias** from **wind**."
     )
-    assert words.alike_words(found) == f"These data cannot tell {cannot}"
+    assert sections.alike_words(found) == f"These data cannot tell {cannot}"
 
 
 def test_what_is_in_every_explanation_is_said_before_what_is_open():
@@ -428,25 +443,27 @@ def test_what_is_in_every_explanation_is_said_before_what_is_open():
         alternatives=[rivals],
         probability={f"{name}+{BIAS.key}": 0.48 for name in rivals} | {"outside": 0.04},
     )
-    assert words.settled(found) == [BIAS]
-    said = words.missing(found)
+    assert explanations.settled(found) == [BIAS]
+    said = first_screen.missing(found)
     assert said.startswith("The sensor of imu_gyro.z shows 0.1")
     assert ". Besides, it is **rolling resistance** or **toe**, and these" in said
     assert said.endswith(
         "The corrected chair has **rolling resistance** (coefficient 0.01460 ± 0.00040)."
     )
     thin = dataclasses.replace(found, effects=[BIAS], alternatives=[])
-    assert words.missing(thin).startswith("Probably (96 %), the sensor of imu_gyro.z shows 0.1")
+    assert first_screen.missing(thin).startswith(
+        "Probably (96 %), the sensor of imu_gyro.z shows 0.1"
+    )
     likely = {f"{name}+{BIAS.key}": 0.47 for name in rivals} | {"outside": 0.06}
-    said = words.missing(dataclasses.replace(found, probability=likely))
+    said = first_screen.missing(dataclasses.replace(found, probability=likely))
     assert said.startswith("Probably (94 %), the sensor of imu_gyro.z") and "Besides" in said
     doubted = dataclasses.replace(found, probability={"outside": 0.6, f"toe+{BIAS.key}": 0.4})
-    assert words.settled(doubted) == []
+    assert explanations.settled(doubted) == []
 
 
 @pytest.mark.parametrize("verdict", [Verdict.NONE, Verdict.UNKNOWN])
 def test_no_name_where_none_is_named(verdict):
-    assert "resistance" not in words.missing(Diagnosis(verdict=verdict))
+    assert "resistance" not in first_screen.missing(Diagnosis(verdict=verdict))
 
 
 def test_words_from_outside_are_escaped():
@@ -491,7 +508,9 @@ def test_probabilities_have_a_sentence_and_bars():
     found = diagnosis()
     assert probability.figure(found) is None
     found.probability = {"rolling_resistance": 0.97, "outside": 0.02, "none": 0.01}
-    assert words.sure(found).startswith("Probability: 97 % rolling resistance, 2 % something")
+    assert first_screen.sure(found).startswith(
+        "Probability: 97 % rolling resistance, 2 % something"
+    )
     figure = probability.figure(found)
     assert [bar.get_width() for bar in figure.axes[0].patches] == pytest.approx([1.0, 2.0, 97.0])
     assert_legible(figure)
@@ -507,7 +526,7 @@ def test_the_named_effects_with_more_beside_them_count_for_them():
         "outside": 0.03,
         "toe": 0.01,
     }
-    said = words.sure(found)
+    said = first_screen.sure(found)
     assert said.startswith(
         "Probability: 96 % rolling resistance (90 % with nothing more), 3 % something"
     )
@@ -644,9 +663,9 @@ def test_what_is_left_goes_with_what_was_measured():
     found.more_missing = True
     heading = MissingForce(force=Force.YAW, goes_with=Driver(Quantity.HEADING), sigmas=99.0)
     found.drivers = [heading, *found.drivers]
-    assert "goes with heading" in words.remainder_words(found)
+    assert "goes with heading" in first_screen.remainder_words(found)
     found.evidence = dataclasses.replace(found.evidence, turns=False)
-    assert "goes with stroke" in words.remainder_words(found)
+    assert "goes with stroke" in first_screen.remainder_words(found)
 
 
 @pytest.mark.parametrize(
@@ -658,15 +677,15 @@ def test_what_is_left_goes_with_what_was_measured():
 )
 def test_what_nothing_explains_names_what_is_most_probable(probability, said):
     """82 % stood on an effect, of which the first sentence said that no effect explains it."""
-    assert said in words.missing(Diagnosis(verdict=Verdict.UNKNOWN, probability=probability))
+    assert said in first_screen.missing(Diagnosis(verdict=Verdict.UNKNOWN, probability=probability))
 
 
 def test_what_happened_in_one_run_is_said_first():
     """A knock that the next step told stood under a force that no effect explains."""
     found = Diagnosis(verdict=Verdict.UNKNOWN, moment=Moment(trial="run2", begin=2, end=4))
-    assert words.missing(found).startswith("Something happened in run2 between 2 and 4 s")
+    assert first_screen.missing(found).startswith("Something happened in run2 between 2 and 4 s")
     held = Diagnosis(verdict=Verdict.UNKNOWN, moment=Moment(trial="run5"))
-    assert words.missing(held).startswith("Something happened in run5, which is held out")
+    assert first_screen.missing(held).startswith("Something happened in run5, which is held out")
     assert held.to_dict()["moment"] == {"trial": "run5", "begin": None, "end": None}
 
 
@@ -677,7 +696,7 @@ def test_none_says_what_held_out_runs_leave(held, before, said):
     scope = "held-out trials" if held else "trials"
     gap = GapSummary(before=before, after=None, scope=scope, p_value=1e-6, p_value_after=None)
     found = Diagnosis(verdict=Verdict.NONE, gap=gap, material=Material(3.0, 1.2))
-    assert ("1.4 times the noise in those held out" in words.missing(found)) == said
+    assert ("1.4 times the noise in those held out" in first_screen.missing(found)) == said
 
 
 def test_mean_forces_are_not_drawn_towards_zero():
@@ -716,7 +735,7 @@ def test_what_a_person_does_that_nothing_shows_is_told_where_it_counts():
     levels = {"drive": Estimate(value=2.0, std=None, unit="N")}
     for left, told in ((0.004, False), (0.2, True)):
         levels["person"] = Estimate(value=left, std=None, unit="1")
-        said = words.process_words(Diagnosis(verdict=Verdict.NONE, process=levels))
+        said = sections.process_words(Diagnosis(verdict=Verdict.NONE, process=levels))
         assert ("20 % of the force by which the person moves" in said) == told
 
 
@@ -729,7 +748,7 @@ def test_what_is_roughly_known_of_a_sensor_is_in_words():
 def test_a_model_that_tips_where_nothing_shows_it_is_said_first():
     """It was a payload of -30 kg, and then a force outside the library."""
     tips = dataclasses.replace(diagnosis(Verdict.UNKNOWN), tipped=["sprint"])
-    assert words.missing(tips).startswith("In sprint the chair of the model tips, ")
+    assert first_screen.missing(tips).startswith("In sprint the chair of the model tips, ")
     assert tips.to_dict()["tipped"] == ["sprint"]
 
 
@@ -754,10 +773,10 @@ def test_a_gap_that_roughly_known_numbers_make_is_told_where_nothing_is_missing(
     gap = GapSummary(before=3.16, after=None, scope="held-out trials: rms", p_value=0.9,
                      p_value_after=None, unforeseen=1.05)  # fmt: skip
     found = dataclasses.replace(diagnosis(Verdict.NONE), gap=gap)
-    said = words.missing(found)
+    said = first_screen.missing(found)
     assert "3.2 times the noise that the chair leaves on held-out runs, all but 1.1 can" in said
     found.gap = dataclasses.replace(gap, unforeseen=3.0)
-    assert "times the noise that" not in words.missing(found)
+    assert "times the noise that" not in first_screen.missing(found)
 
 
 def test_a_run_that_is_shaken_far_harder_is_said_where_nothing_is_missing():
@@ -765,10 +784,10 @@ def test_a_run_that_is_shaken_far_harder_is_said_where_nothing_is_missing():
     found = dataclasses.replace(
         diagnosis(Verdict.NONE), next_experiment="", shaken=Shaken("first", 2.85, "second", 1.27)
     )
-    said = words.missing(found)
+    said = first_screen.missing(found)
     assert said.startswith("Nothing")
     assert "But first is shaken far harder than second, by 2.9 N against 1.3 N, which" in said
-    assert words.next_step(found) == "Look at what was different in first, and repeat it."
+    assert first_screen.next_step(found) == "Look at what was different in first, and repeat it."
     assert found.to_dict()["shaken"]["other"] == "second"
 
 

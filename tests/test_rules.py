@@ -9,7 +9,7 @@ from mjchair.diagnosis import notes, rules
 from mjchair.diagnosis.explain import search_rules
 from mjchair.diagnosis.result import Estimate
 from mjchair.diagnosis.rules import HeldOut, Standing, Verdict
-from mjchair.report.diagnosis_words import nothing_missing, turn_words
+from mjchair.report.diagnosis_words.first_screen import nothing_missing, turn_words
 
 # an effect that closes all and is sure
 CLEAR = Standing(

@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
     from mjchair.diagnosis.diagnose import diagnose
     from mjchair.diagnosis.replay.cache import Store
     from mjchair.effects import user_file
-    from mjchair.report import diagnosis_words
+    from mjchair.report.diagnosis_words.first_screen import first_screen
     from mjchair.storage import check_vacant, only_writer, output_folder
 
     kept = Path(args.out) / CACHE
@@ -108,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
             return 130
         shutil.rmtree(kept, ignore_errors=True)
     print(f"{_line(found)}; see {folder}/report.html")
-    for head, said in diagnosis_words.first_screen(found).items():
+    for head, said in first_screen(found).items():
         print(f"  {head}: {said.replace('**', '')}")
     return 0
 

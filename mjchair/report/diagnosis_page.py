@@ -2,7 +2,7 @@
 
 In: a diagnosis and its figures. Out: HTML with style and figures inside. The first screen says what
 is missing, how sure that is and what to do next, with one picture; the argument is folded below it.
-The form is in templates/, the sentences are made in diagnosis_words.py.
+The form is in templates/, the sentences are made in diagnosis_words/.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.result import Candidate, Diagnosis
 from mjchair.effects.library import find
 from mjchair.errors import MjchairError
-from mjchair.report import colours, diagnosis_words
+from mjchair.report import colours
 from mjchair.report.diagnosis_figures import (
     candidates,
     gap,
@@ -34,6 +34,10 @@ from mjchair.report.diagnosis_figures import (
     where,
     whole_runs,
 )
+from mjchair.report.diagnosis_words import sections
+from mjchair.report.diagnosis_words.first_screen import first_screen, next_step
+from mjchair.report.diagnosis_words.forces import known_drivers, regime
+from mjchair.report.diagnosis_words.names import open_upwards
 from mjchair.units import per_cent
 
 TEMPLATE = "diagnosis.html"
@@ -102,18 +106,17 @@ def page(
       title: of the page, such as the study's.
       replay: HTML of a replay to show on the first screen; "": none.
     """
-    words = diagnosis_words
     evidence, gaps = diagnosis.evidence, diagnosis.gap
     said = {
-        "gap": words.gap_words(diagnosis),
-        "process": words.process_words(diagnosis),
-        "drivers": words.driver_words(diagnosis),
-        "alike": words.alike_words(diagnosis),
-        "other_runs": words.other_runs(diagnosis),
-        "choice": words.choice_words(diagnosis),
-        "left": words.left_words(diagnosis),
-        "runs": words.runs_words(diagnosis),
-        "experiment": diagnosis.next_experiment or words.next_step(diagnosis),
+        "gap": sections.gap_words(diagnosis),
+        "process": sections.process_words(diagnosis),
+        "drivers": sections.driver_words(diagnosis),
+        "alike": sections.alike_words(diagnosis),
+        "other_runs": sections.other_runs(diagnosis),
+        "choice": sections.choice_words(diagnosis),
+        "left": sections.left_words(diagnosis),
+        "runs": sections.runs_words(diagnosis),
+        "experiment": diagnosis.next_experiment or next_step(diagnosis),
         "experiments": _experiments_note(diagnosis),
     }
     tables = {
@@ -130,10 +133,10 @@ def page(
         .get_template(TEMPLATE)
         .render(
             title=title,
-            first=words.first_screen(diagnosis),
+            first=first_screen(diagnosis),
             said=said,
             tables=tables,
-            notes=words.notes(diagnosis),
+            notes=sections.notes(diagnosis),
             captions={
                 "summary": summary.caption(diagnosis),
                 "where": where.caption(diagnosis),
@@ -182,7 +185,7 @@ def _cells(diagnosis: Diagnosis) -> Table:
                 w.trial,
                 w.channel,
                 f"{w.window[0]:.1f} to {w.window[1]:.1f} s",
-                diagnosis_words.regime(diagnosis, w),
+                regime(diagnosis, w),
                 f"{w.statistic:.3g}" if w.statistic < 1000 else f"{w.statistic:,.0f}",
             ]
         )
@@ -201,7 +204,7 @@ def _drivers(diagnosis: Diagnosis) -> Table:
                 f"{d.sigmas:.1f}",
             ]
         )
-        for d in diagnosis_words.known_drivers(diagnosis)
+        for d in known_drivers(diagnosis)
     ]
     return Table([Head("force"), Head("goes with"), Head("sigma", True)], rows)
 
@@ -256,7 +259,7 @@ def _effects(diagnosis: Diagnosis) -> Table:
             [
                 plain(e.name) + (f" ({e.channel})" if e.channel else ""),
                 plain(name),
-                diagnosis_words.open_upwards(p) or f"{p.value:.4g}",
+                open_upwards(p) or f"{p.value:.4g}",
                 "held" if p.std is None else f"{p.std:.2g}",
                 p.unit,
                 per_cent(e.closure),

@@ -13,7 +13,7 @@ from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.result import Diagnosis, ForceLevels, ForceSamples
 from mjchair.report.colours import AXIS_LINE, BEFORE
-from mjchair.report.diagnosis_words import TURNING
+from mjchair.report.diagnosis_words.forces import TURNING
 from mjchair.report.figure import Figure
 
 CAPTION = (

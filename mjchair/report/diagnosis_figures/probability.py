@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from mjchair.diagnosis.result import Diagnosis
 from mjchair.report.colours import AFTER, FAINT
-from mjchair.report.diagnosis_words import explanations, hypothesis_words
+from mjchair.report.diagnosis_words.explanations import explanations
+from mjchair.report.diagnosis_words.names import hypothesis_words
 from mjchair.report.figure import Figure
 from mjchair.units import probable
 

@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from mjchair.diagnosis.result import Diagnosis
 from mjchair.report.colours import AFTER, BEFORE
 from mjchair.report.diagnosis_figures.whole_runs import draw_run, telling
-from mjchair.report.diagnosis_words import size, unforeseen_words
+from mjchair.report.diagnosis_words.first_screen import unforeseen_words
+from mjchair.report.diagnosis_words.names import size
 from mjchair.report.figure import Figure
 
 PLATE = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}  # behind a number

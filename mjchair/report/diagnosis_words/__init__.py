@@ -1,0 +1,1 @@
+"""What the report of a diagnosis says, in plain sentences."""
