@@ -657,6 +657,24 @@ def test_without_a_turn_measured_nothing_is_said_of_turning():
     ]
 
 
+def test_a_number_at_the_end_of_what_is_believed_is_why_nothing_is_named():
+    """Of a pushed chair taken to coast, a rolling resistance of -0.01 stood in an answer."""
+    found = Diagnosis(
+        verdict=Verdict.UNKNOWN, probability={"floor_slope+rolling_resistance": 0.8, "none": 0.2}
+    )
+    ends = (("rolling_resistance", "coefficient"),)
+    near = Nearest(
+        effects=("rolling_resistance", "floor_slope"), closure=0.9, remainder=1.5, ends=ends
+    )
+    found.nearest = near
+    said = first_screen.missing(found)
+    assert "but only with the coefficient of rolling resistance at the end of what is" in said
+    found.nearest = dataclasses.replace(near, ends=())
+    assert "it explains too little" in first_screen.missing(found)
+    found.nearest = dataclasses.replace(near, effects=("floor_slope",))
+    assert "it explains too little" in first_screen.missing(found)
+
+
 def test_what_is_left_goes_with_what_was_measured():
     """Of a chair whose turns nothing tells, the first screen said that it goes with heading."""
     found = diagnosis(Verdict.AMBIGUOUS)

@@ -53,6 +53,7 @@ def test_one_of_two_effects_may_stand_in_for_what_they_leave_held_out(after, two
         {"closure": rules.PARTLY - 0.01},
         {"gain_by_run": rules.HELD - 0.1},
         {"held_out": HeldOut(before=1000.0, after=1001.0, dof=100.0, changed=900.0)},
+        {"at_bound": True},
     ],
 )
 def test_each_of_these_alone_makes_it_unknown(reason):
@@ -88,7 +89,6 @@ def test_just_inside_each_limit_it_is_still_named(allowed):
     "doubt",
     [
         {"sigmas": (20.0, rules.SIGMAS)},
-        {"at_bound": True},
         {"gain_by_manoeuvre": 0.0},
         {"closure": rules.CLOSES - 0.01},
         {"closure": rules.PARTLY},

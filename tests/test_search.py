@@ -107,7 +107,7 @@ def fits(monkeypatch):
             Term(s.effect, {"size": min(share, found.most)}, ()) for s in hypothesis.starts
         )
 
-    monkeypatch.setattr(rules, "NOTHING", 0.0)  # no effect is so small that columns hold
+    monkeypatch.setattr(search_rules, "NOTHING", 0.0)  # no effect is so small that columns hold
     monkeypatch.setattr(forward_selection, "_happened_once", lambda *_: False)
     monkeypatch.setattr(probable, "probabilities", lambda *_: {})
     monkeypatch.setattr(whole_sizes, "fits", lambda *_: ())
@@ -419,7 +419,7 @@ def test_a_chair_without_effects_is_fitted_from_where_effects_ended_that_are_har
 def test_columns_are_made_anew_only_where_that_may_change_a_fit(
     fits, monkeypatch, total, promised, far, again
 ):
-    monkeypatch.setattr(rules, "NOTHING", 1.0)
+    monkeypatch.setattr(search_rules, "NOTHING", 1.0)
     first = fit(total, "rolling", promised=promised)
     first.variant = replace(first.variant, offsets={"mass": far})
     fits.answers["rolling", "track of rolling"] = anew = fit(total - 0.1, "rolling")

@@ -738,6 +738,25 @@ def test_a_place_on_the_floor_is_looked_for_where_runs_share_a_frame(starts, unp
     assert looked_for == (not unplaced)
 
 
+def test_what_shows_in_turns_alone_is_not_looked_for_where_one_wheel_stands_for_both(tmp_path):
+    from mjchair.diagnosis.diagnose import study_effects
+
+    found = {}
+    for name, columns in (
+        ("both", wheels()),
+        ("one", {"left_wheel_speed": wheels()["left_wheel_speed"]}),
+        ("gyroscope", {"left_wheel_speed": wheels()["left_wheel_speed"], "imu_gyro.z": 0.1 * TIME}),
+    ):
+        (tmp_path / name).mkdir()
+        study = mjchair.read_study(write(tmp_path / name, columns))
+        found[name] = {e.name for e in study_effects(study)}
+        assert study.straight == (name == "one")
+    turning = {"cornering_stiffness", "relaxation_length", "caster_trail", "turning_scrub"}
+    assert not turning & found["one"]
+    assert turning <= found["both"] & found["gyroscope"]
+    assert {"rolling_resistance", "caster_friction", "tire_friction"} <= found["one"]
+
+
 def test_what_a_person_knows_reaches_the_rules_of_the_diagnosis(tmp_path):
     from mjchair.diagnosis.diagnose import study_effects
     from mjchair.diagnosis.fit import noise_levels

@@ -211,6 +211,7 @@ def _nearest(base: Base, choice: Choice, closed: float) -> Nearest:
         effects=tuple(t.effect.key for t in choice.fitted.variant.terms),
         closure=closed,
         remainder=over_noise(*slow_part(choice.fitted.system, _shown_windows(base))),
+        ends=tuple((key.effect, key.parameter) for key in _at_bound(choice.fitted)),
     )
 
 
@@ -226,7 +227,7 @@ def standing(
         gain_by_run=held_out_gain(base, fitted),
         gain_by_manoeuvre=held_out_gain(base, fitted, "manoeuvre"),
         sigmas=_sigmas(choice),
-        at_bound=bool(fitted.at_bound),
+        at_bound=bool(_at_bound(fitted)),
         probability=of_effects(probability, choice.hypothesis.keys),
         rivals=bool(exchanged(choice)),
         once=_once(base, choice, held),
@@ -234,6 +235,11 @@ def standing(
         held_out=held,
         walls=_walls_that_count(base, choice),
     )
+
+
+def _at_bound(fitted: Fitted) -> list[ParameterId]:
+    """The sizes that ended on a bound, but for those than which far larger ones fit as well."""
+    return [key for key in fitted.at_bound if key not in fitted.at_least]
 
 
 def _sigmas(choice: Choice) -> tuple[float, ...]:

@@ -40,6 +40,7 @@ def study_effects(study: Study, more: Sequence[Effect] = ()) -> list[Effect]:
         for effect in known
         if not (effect.outdoors and study.indoors)
         and not (effect.place and study.unplaced)
+        and not (effect.turning and study.straight)
         and effect.commanded in (None, not study.torque_measured)
     ]
     wrong = mistaken(study.channels, study.nuisance, study.driven_as_measured)

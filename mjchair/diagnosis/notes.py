@@ -31,6 +31,7 @@ from mjchair.units import per_cent, with_unit
 FAR_GAIN = 2.0  # standard deviations of a sensor's gain, from which it is told
 NEAR = 1.5  # times the noise that was given: of what is nearer nothing is said
 NEARLY = 0.98  # of the most that may shake a chair, from which a word is said
+ANSWERS = (Verdict.NAMED, Verdict.AMBIGUOUS)
 TOP = 3  # drivers of a missing force that are worth a word
 
 
@@ -76,10 +77,14 @@ def notes_on(
     ]
     if said != Verdict.UNKNOWN:  # what is missing may have moved them
         notes += _of_gains(choice.fitted if choice else base.plain)
-    if choice is not None and said in (Verdict.NAMED, Verdict.AMBIGUOUS):
+    if choice is not None and said in ANSWERS:
         terms = choice.fitted.variant.terms
         said_of = [(term.effect.name, remark(choice.fitted, term)) for term in terms]
         notes += [f"{name}: {line}" for name, line in said_of if line]
+    if choice is not None and (
+        said in ANSWERS or (said == Verdict.UNKNOWN and choice.fitted.at_bound)
+    ):
+        terms = choice.fitted.variant.terms
         notes += [line for term in terms for line in _at_ends(term, choice.fitted.std)]
     notes += _as_loud_as_believed(base.bench)
     if alone is not None:

@@ -246,11 +246,13 @@ class Nearest:
     Attributes:
       effects: their keys. closure: share of the excess that they close. remainder: rms of the
         whitened residual that they leave on the trials of the gap's scope; noise gives 1.
+      ends: effect and name of each of their numbers that is on the bound of what is believed of it.
     """
 
     effects: tuple[str, ...]
     closure: float
     remainder: float
+    ends: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -109,8 +109,10 @@ class Standing:
         fails. gain_by_run, gain_by_manoeuvre: chi2 that they bring on each run, or manoeuvre, when
         they are fitted to the others.
       sigmas: of every effect, how far it is from neutral in standard errors.
-      at_bound: whether a parameter ended on a bound. probability: of the effects, against rivals
-        and all else. rivals: whether something could stand in the place of one of them.
+      at_bound: whether a size ended on a bound, and is not one than which far larger ones fit as
+        well.
+      probability: of the effects, against rivals and all else. rivals: whether something could
+        stand in the place of one of them.
       once: whether something that happened once fits as well.
       runs: that were fitted to.
       held_out: the trials that no fit saw; None where there are none.
@@ -184,8 +186,12 @@ def verdict(gap: bool, choice: Standing | None) -> Verdict:
 
 
 def explains(choice: Standing) -> bool:
-    """Whether the effects are an answer, alone or beside their rivals, with a remainder or not."""
-    if choice.closure < PARTLY or choice.one_run:
+    """Whether the effects are an answer, alone or beside their rivals, with a remainder or not.
+
+    A size on the bound of what is believed of it is none: a chair that somebody pushed came as one
+    that rolls down a slope with a rolling resistance of -0.01.
+    """
+    if choice.closure < PARTLY or choice.one_run or choice.at_bound:
         return False
     if choice.held_out is None:
         return choice.gain_by_run >= HELD
@@ -250,7 +256,7 @@ def _scatter(dof: float) -> float:
 def sure(choice: Standing) -> bool:
     """Whether every effect is clearly there, and shows in more than one manoeuvre."""
     clear = all(s > SIGMAS for s in choice.sigmas)
-    return clear and not choice.at_bound and choice.gain_by_manoeuvre > 0.0
+    return clear and choice.gain_by_manoeuvre > 0.0
 
 
 def closure(

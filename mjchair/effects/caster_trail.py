@@ -21,5 +21,6 @@ EFFECT = Effect(
     signature="swivel dynamics",
     source="casters have 0.04-0.06 m of trail",
     edit=edit,
+    turning=True,
     by_hand="measure how far the axle of each caster is behind its stem",
 )

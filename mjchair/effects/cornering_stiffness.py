@@ -24,6 +24,7 @@ EFFECT = Effect(
     signature="slope of Fy over alpha",
     source="Dressel 2013: 0.15 to 0.35 of the load per degree, for 14 tires",
     edit=edit,
+    turning=True,
     shared={"caster_stiffness": ("front",), "rear_stiffness": ("rear",)},
     example={"front": 0.0, "rear": -0.4},  # casters align: their stiffness hardly shows
 )

@@ -141,7 +141,7 @@ class Effect:
         measured at push rims; None: wherever they come from.
       everywhere: every chair has a little of it, and present runs may not show it.
       common: how often it is what is missing, over most other effects (assumption).
-      outdoors: it is there outdoors only.
+      outdoors: it is there outdoors only. turning: it shows only where a chair turns.
       example: values to practise with; None: typical ones.
       most, least: parameter -> upper and lower bound that follow from the chair in hand; None:
         those of the parameters hold on any.
@@ -174,6 +174,7 @@ class Effect:
     everywhere: bool = False
     common: float = 1.0
     outdoors: bool = False
+    turning: bool = False
     example: Values | None = None
     most: Callable[[mujoco.MjSpec], Values] | None = None
     least: Callable[[mujoco.MjSpec], Values] | None = None

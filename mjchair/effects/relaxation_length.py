@@ -22,5 +22,6 @@ EFFECT = Effect(
     signature="Fy lags, in proportion to omega sigma / v",
     source="car tires half a metre, bicycle tires 0.1-0.2 m (Pacejka 2006)",
     edit=edit,
+    turning=True,
     example={"length": 0.04},  # with more the casters shimmy
 )

@@ -40,4 +40,5 @@ EFFECT = Effect(
     source="a patch of 8 cm under 300 N at friction 0.8 gives some 5 N m; assumed",
     edit=edit,
     everywhere=True,
+    turning=True,
 )

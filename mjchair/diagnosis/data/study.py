@@ -112,6 +112,11 @@ class Study:
         )
 
     @property
+    def straight(self) -> bool:
+        """Whether one wheel stands for both in every run, so that none is taken to turn."""
+        return all(trial_checks.with_copied_wheel(r.trial) is not r.trial for r in self.runs)
+
+    @property
     def fitted(self) -> tuple[int, ...]:
         """Indices of the runs that are not held out."""
         return tuple(i for i, run in enumerate(self.runs) if not run.hold_out)

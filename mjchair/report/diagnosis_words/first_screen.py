@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from mjchair.diagnosis.explain.calibration import NONE, OUTSIDE
 from mjchair.diagnosis.explain.probability import ONE_RUN, of_effects
 from mjchair.diagnosis.fit import bounded
-from mjchair.diagnosis.next_experiment.wording import MEASURED, measured
+from mjchair.diagnosis.next_experiment.wording import MEASURED, measured, plain
 from mjchair.diagnosis.result import Diagnosis, GapSummary, Moment, NamedEffect, OneRun
 from mjchair.diagnosis.rules import LEVEL, LIKELY, PROBABLE, Verdict
 from mjchair.report.diagnosis_words.explanations import (
@@ -81,10 +81,16 @@ def _unexplained(diagnosis: Diagnosis) -> str:
     first = next(iter(explanations(diagnosis)), None)
     if first is None or first.name in (NONE, OUTSIDE, ONE_RUN):
         return "A force is missing that no effect of the library explains, so none is named."
+    near = diagnosis.nearest
+    why = "it explains too little of these runs, or not all of them"
+    if near is not None and near.ends and "+".join(sorted(near.effects)) == first.name:
+        ends = " and ".join(
+            f"the {plain(number)} of {plain(effect)}" for effect, number in near.ends
+        )
+        why = f"only with {ends} at the end of what is believed of it"
     return (
         f"Something is missing. Of the library {hypothesis_words(first.name)} is the most "
-        "probable, but it explains too little of these runs, or not all of them, so nothing is "
-        "named."
+        f"probable, but {why}, so nothing is named."
     )
 
 
