@@ -3,10 +3,12 @@
 import math
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from mjchair.diagnosis import material
 from mjchair.diagnosis.fit.variant import Term
+from mjchair.diagnosis.replay.pulses import Force
 from mjchair.effects.library import find
 
 
@@ -29,3 +31,29 @@ def test_errors_of_sensors_alone_are_no_small_force(effects, size, monkeypatch):
     terms[:] = [Term(t.effect, {}, tuple(p.name for p in t.effect.fitted)) for t in terms]
     base = SimpleNamespace(bench=SimpleNamespace(simulator=SimpleNamespace(study=None)))
     assert material.material(base, None, choice, None).value == size
+
+
+@pytest.mark.parametrize(
+    ("acting", "force", "found"),
+    [
+        (slice(43, 46), Force.FORWARD, 15.0),  # of 20 windows with ten pulses each
+        (slice(43, 46), Force.YAW, 60.0),  # at wheels 0.25 m aside
+        (slice(43, 44), Force.FORWARD, 0.0),  # a jerk
+        (slice(0, 200), Force.FORWARD, 15.0),
+    ],
+)
+def test_a_force_of_one_second_is_as_large_as_one_that_stays(acting, force, found, monkeypatch):
+    """Of a foot that dragged for a second with 15 N, no force was larger than 0.3 N."""
+    value = np.zeros(400)
+    value[(0 if force == Force.FORWARD else 200) + np.arange(200)[acting]] = -15.0
+    pulses = [
+        SimpleNamespace(force=f, window=k // 10)
+        for f in (Force.FORWARD, Force.YAW)
+        for k in range(200)
+    ]
+    monkeypatch.setattr(material.missing_force, "equivalent_force", lambda *_: (value, 1.0))
+    monkeypatch.setattr(material, "rear_axle", lambda _: SimpleNamespace(track=0.5))
+    around = SimpleNamespace(track=None, pulses=pulses, answers=None)
+    bench = SimpleNamespace(simulator=SimpleNamespace(base=None))
+    base = SimpleNamespace(around=around, bench=bench)
+    assert material._force(base, []) == pytest.approx(found)

@@ -25,24 +25,6 @@ if TYPE_CHECKING:
 
 LOG_EVERY = 20.0  # s between lines of progress in a log
 CACHE = "unfinished"  # simulations of a diagnosis that was interrupted
-TOP = (
-    "verdict",
-    "effects",
-    "alternatives",
-    "candidates",
-    "gap",
-    "where",
-    "next_experiment",
-    "probability",
-    "more_missing",
-    "one_run",
-    "tipped",
-    "material",
-    "process",
-    "shaken",
-    "drivers",
-    "notes",
-)
 GAP = ("before", "after", "noise_floor", "scope")
 CANDIDATE = ("name", "channel", "held_out_gain", "closure", "detectability", "p_value")
 
@@ -169,8 +151,7 @@ def _replay(study: Study, found: Diagnosis) -> str:
 
 def contract(found: Diagnosis) -> dict[str, Any]:
     """What diagnosis.json holds; a sensor's effect has its channel besides."""
-    everything = found.to_dict()
-    out = {key: everything[key] for key in TOP}
+    out = found.to_dict()
     out["gap"] = {key: out["gap"][key] for key in GAP}
     out["candidates"] = [{k: c[k] for k in CANDIDATE if k in c} for c in out["candidates"]]
     return out

@@ -154,6 +154,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         more_missing=bool(named and stands and rules.more_missing(stands)),
         material=size,
         process=_process(base),
+        loud=noise_shown.at_most(base.bench) if named else (),
         shaken=_shaken(noise_shown.forward_levels(base.bench), size.limit),
         terms=named.fitted.variant.terms if named else (),
         correction=named.fitted.variant if named else None,
@@ -450,8 +451,10 @@ def _found_effect(
 def _candidates(base: Base, gap: Gap, choice: Choice | None) -> list[Candidate]:
     """Every effect alone, as it was screened."""
     out = []
-    excess = max(gap.excess, 1.0) if gap.exists else math.inf  # nothing closes what is not there
-    total = gain(base, choice.fitted) if choice else excess
+    # nothing closes what is not there
+    shown = max([gap.excess, 1.0, *(t.statistic - t.dof for t in gap.tests)])
+    excess = shown if gap.exists else math.inf
+    total = max(gain(base, choice.fitted), excess) if choice else excess
     for h in hypotheses.singles(base.reduced, base.starts):
         columns = base.system.index(h.columns)
         gained = held_out(base.bench, (base.system, []), (base.system, columns))
@@ -495,6 +498,7 @@ def _summary(base: Base, gap: Gap, choice: Choice | None, unforeseen: float) -> 
         p_value=gap.p,
         p_value_after=choice.after.p if choice else None,
         unforeseen=unforeseen if is_held else None,
+        shows_after=choice is not None and choice.after.exists,
     )
 
 

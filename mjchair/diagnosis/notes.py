@@ -17,7 +17,7 @@ from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.one_run import InOneRun
 from mjchair.diagnosis.explain.run_by_run import Uneven
 from mjchair.diagnosis.explain.screening import Base
-from mjchair.diagnosis.fit import bounded, noise_levels, process
+from mjchair.diagnosis.fit import bounded, process
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.nonlinear import Fitted, at_end
@@ -30,7 +30,6 @@ from mjchair.units import per_cent, with_unit
 
 FAR_GAIN = 2.0  # standard deviations of a sensor's gain, from which it is told
 NEAR = 1.5  # times the noise that was given: of what is nearer nothing is said
-NEARLY = 0.98  # of the most that may shake a chair, from which a word is said
 ANSWERS = (Verdict.NAMED, Verdict.AMBIGUOUS)
 TOP = 3  # drivers of a missing force that are worth a word
 
@@ -125,17 +124,14 @@ def _at_ends(term: Term, std: Mapping[ParameterId, float]) -> Iterator[str]:
 
 def _as_loud_as_believed(bench: Bench) -> Iterator[str]:
     """What shakes the chair as much as is believed of it: more may hide there."""
-    if bench.process is None:
-        return
-    given = noise_levels.known_parts(bench.simulator.study)
-    for name, share in noise_shown.shares(bench).items():
-        if share > NEARLY and process.NAMED[name][0][0] not in given:
-            level = f"{process.level(bench.process.levels, name):.2g}"
-            yield (
-                f"what shakes the chair ({name.replace('_', ' ')}) stands at "
-                f"{with_unit(level, process.NAMED[name][1])}, the most that is believed of it: a "
-                "steady force may hide there ([noise] in study.toml sets it)"
-            )
+    for name in noise_shown.at_most(bench, noise_shown.SHAKING):
+        assert bench.process is not None
+        level = f"{process.level(bench.process.levels, name):.2g}"
+        yield (
+            f"what shakes the chair ({name.replace('_', ' ')}) stands at "
+            f"{with_unit(level, process.NAMED[name][1])}, the most that is believed of it: a "
+            "steady force may hide there ([noise] in study.toml sets it)"
+        )
 
 
 def _of_tipping(bench: Bench) -> Iterator[str]:

@@ -122,7 +122,8 @@ class GapSummary:
     `after` is what the corrected chair leaves, None where there is none. `unforeseen` is what is
     left, by the corrected chair where there is one, without what the fitted trials leave open of
     the numbers that are only roughly known; None where no trial is held out. `p_value` and
-    `p_value_after` are of all tests together, on the trials that were fitted to.
+    `p_value_after` are of all tests together, on the trials that were fitted to; `shows_after` says
+    whether a gap shows in what is left, which asks for a single test that stands out as well.
     """
 
     before: float
@@ -131,6 +132,7 @@ class GapSummary:
     p_value: float
     p_value_after: float | None
     unforeseen: float | None = None
+    shows_after: bool = False
     noise_floor: float = 1.0
 
     @property
@@ -400,6 +402,8 @@ class Diagnosis:
         something that is no noise. material: the largest missing force, and what matters.
       process: drive, side, yaw, wheel_turn, caster_turn -> standard deviation of what shakes the
         chair; person -> share of a moving person's force that is in no model.
+      loud: which of drive, side and yaw stand at the most that is believed of them: a steady force
+        may hide there.
       shaken: a run that is shaken far harder than another of its kind; None: none is.
       terms: the effects with the values that stand in the corrected chair.
       correction: the corrected chair, with what is only roughly known where the fit moved it.
@@ -423,6 +427,7 @@ class Diagnosis:
     more_missing: bool = False
     material: Material | None = None
     process: Mapping[str, Estimate] = field(default_factory=dict)
+    loud: tuple[str, ...] = ()
     shaken: Shaken | None = None
     terms: tuple[Term, ...] = ()
     correction: Variant | None = field(default=None, repr=False)
@@ -448,6 +453,7 @@ class Diagnosis:
             "next_experiment": self.next_experiment,
             "probability": {name: round(p, 4) for name, p in self.probability.items()},
             "more_missing": self.more_missing,
+            "loud": list(self.loud),
             "material": self.material.to_dict() if self.material else {},
             "process": {n: {"value": e.value, "unit": e.unit} for n, e in self.process.items()},
             "shaken": asdict(self.shaken) if self.shaken else None,

@@ -41,6 +41,8 @@ SHAKES = 0.3  # of the chair's own rolling resistance: what shakes it harder has
 # mass to some per cent; without them strokes, of which no two are alike, have one course
 UNLIKE, STROKES_UNLIKE = 0.1, 0.2
 SHAKING = tuple(name for name in NAMED if name != "person")  # what shakes a chair
+STEADY = ("drive", "side", "yaw")  # of that, where a steady force may hide
+NEARLY = 0.98  # of the most that is believed of what shakes a chair: a word is said from there on
 HUSH = 0.05  # of a level: nearly nothing
 SIZES = 5.0  # sizes worth finding: prior of the best hypothesis
 
@@ -100,6 +102,14 @@ def shares(bench: Bench) -> dict[str, float]:
     assert bench.process is not None
     most, levels = _most(bench.simulator), bench.process.levels
     return {n: process.level(levels, n) / float(most[NAMED[n][0][0]].max()) for n in SHAKING}
+
+
+def at_most(bench: Bench, names: Sequence[str] = STEADY) -> tuple[str, ...]:
+    """What shakes the chair as much as is believed of it, where study.toml does not give it."""
+    if bench.process is None:
+        return ()
+    given, known = noise_levels.known_parts(bench.simulator.study), shares(bench)
+    return tuple(n for n in names if known[n] > NEARLY and NAMED[n][0][0] not in given)
 
 
 def forward_levels(bench: Bench) -> list[dict[str, float]]:

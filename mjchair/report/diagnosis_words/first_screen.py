@@ -5,7 +5,7 @@ In: a diagnosis. Out: a few plain sentences.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from mjchair.diagnosis.explain.calibration import NONE, OUTSIDE
 from mjchair.diagnosis.explain.probability import ONE_RUN, of_effects
@@ -33,7 +33,7 @@ from mjchair.report.diagnosis_words.names import (
     share,
     size,
 )
-from mjchair.units import per_cent, probable
+from mjchair.units import per_cent, probable, with_unit
 
 NOTABLE = 1.5  # times the noise: where a correction leaves more, what can explain it is said
 NOTED = 1.2  # times the noise: where held-out runs leave more, and nothing is missing, it is said
@@ -102,9 +102,9 @@ def _moment_words(moment: Moment) -> str:
             "shows, so nothing is named."
         )
     return (
-        f"Something happened in {moment.trial} between {moment.begin} and {moment.end} s: a force "
-        "that acts there alone explains these runs about as well as any effect, so nothing is "
-        "named."
+        f"Something may have happened once in {moment.trial}, between {moment.begin} and "
+        f"{moment.end} s: a force that acts there alone explains these runs about as well as any "
+        "effect, so nothing is named."
     )
 
 
@@ -205,23 +205,40 @@ def shaken_words(diagnosis: Diagnosis) -> str:
 
 
 def remainder_words(diagnosis: Diagnosis) -> str:
-    """What a name leaves, before the name; nothing where nothing is left."""
-    if not diagnosis.more_missing:
-        return ""
+    """What a name leaves, or what may hide, before the name; nothing where neither is so."""
+    said = [*_left(diagnosis)] if diagnosis.more_missing else []
+    loud = _loud(diagnosis)
+    if loud and not said:
+        said = ["More may be missing than what is named here."]
+    return "".join(f"{sentence} " for sentence in [*said, *loud])
+
+
+def _left(diagnosis: Diagnosis) -> Iterator[str]:
+    """What a name leaves, as sentences."""
     closed = max((e.closure for e in diagnosis.effects), default=0.0)
     share_closed = per_cent(closed) if closed < ALL else "nearly all"
-    ends = _at_their_ends(diagnosis)
-    only = f", and only with a chair at the end of what the study allows ({ends})" if ends else ""
-    after = diagnosis.gap.after if diagnosis.gap else None
-    left = ""
-    if not ends or after is None or after > 1.0:
-        known = known_drivers(diagnosis)
-        goes = str(known[0].goes_with) if known else ""
-        left = f"; what is left goes with {goes}" if goes else "; a remainder is left"
-    return (
+    yield (
         f"More is missing than what is named here, which explains {share_closed} of the gap"
-        f"{_held_out(diagnosis)}{only}{left}. "
+        f"{_held_out(diagnosis)}."
     )
+    ends = _at_their_ends(diagnosis)
+    if ends:
+        yield f"It does so only with a chair at the end of what the study allows ({ends})."
+    known = known_drivers(diagnosis)
+    if known:
+        yield f"What is left goes with {known[0].goes_with}."
+
+
+def _loud(diagnosis: Diagnosis) -> list[str]:
+    """What shakes the chair as much as is believed of it, as a sentence; empty: nothing does."""
+    levels = [diagnosis.process[name] for name in diagnosis.loud]
+    if not levels:
+        return []
+    stands = " and ".join(with_unit(size(e.value), e.unit) for e in levels)
+    return [
+        f"What shakes the chair stands at {stands}, the most that is believed of it: a steady "
+        "force may hide there."
+    ]
 
 
 def _held_out(diagnosis: Diagnosis) -> str:
@@ -230,11 +247,11 @@ def _held_out(diagnosis: Diagnosis) -> str:
     if gap is None or gap.after is None or not gap.held_out:
         return ""
     if gap.before <= 1.0:
-        return " in the runs of the fit (those held out show none)"
+        return " in the runs of the fit; those held out show none"
     if gap.after > STAYS * gap.before:
-        return f" in the runs of the fit (those held out stay at {gap.after:.1f} times the noise)"
+        return f" in the runs of the fit; those held out stay at {gap.after:.1f} times the noise"
     fell = f"from {gap.before:.1f} to {gap.after:.1f} times the noise"
-    return f" in the runs of the fit ({fell} in those held out)"
+    return f" in the runs of the fit; in those held out it falls {fell}"
 
 
 def _at_their_ends(diagnosis: Diagnosis) -> str:
@@ -269,17 +286,23 @@ def sure(diagnosis: Diagnosis) -> str:
 
 def _probabilities(diagnosis: Diagnosis) -> str:
     every = explanations(diagnosis)
-    said = ", ".join(_stated(e) for e in every[:3] if e.alone + e.more >= UNSURE)
+    leaves = diagnosis.more_missing or bool(diagnosis.loud)
+    said = ", ".join(_stated(e, leaves) for e in every[:3] if e.alone + e.more >= UNSURE)
     if diagnosis.verdict == Verdict.NONE and every[0].name != NONE:
         return f"What makes the rest, which does not matter, is open: {said}."
     return f"Probability: {said}."
 
 
-def _stated(explanation: Explanation) -> str:
+def _stated(explanation: Explanation, leaves: bool) -> str:
+    """An explanation with its probability, and that of nothing more.
+
+    Args:
+      leaves: whether something is left: then nobody is told that there is nothing more.
+    """
     alone, more = explanation.alone, explanation.more
     words = hypothesis_words(explanation.name)
-    if explanation.more < UNSURE:
-        return f"{probable(alone)} {words}"
+    if explanation.more < UNSURE or leaves:
+        return f"{probable(alone + more)} {words}"
     return f"{probable(alone + more)} {words} ({probable(alone)} with nothing more)"
 
 
@@ -295,7 +318,7 @@ def next_step(diagnosis: Diagnosis) -> str:
             sensor = all(e.channel is not None for e in diagnosis.effects)
             wrong = "the sensor shows" if sensor else "was recorded"
             return f"These data decide: correct what {wrong}{chair}."
-        if diagnosis.more_missing:
+        if diagnosis.more_missing or diagnosis.loud:
             below = "; what goes with it is listed below" if known_drivers(diagnosis) else ""
             return (
                 "These data decide what is named. Use the corrected chair (model.xml), but look "

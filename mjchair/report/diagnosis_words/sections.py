@@ -165,9 +165,15 @@ def left_words(diagnosis: Diagnosis) -> str:
     if gap is None or gap.p_value_after is None or not diagnosis.effects:
         return ""
     by_chance = chance(gap.p_value_after)
-    said = f"All tests again on what is left: noise alone makes as much with {by_chance}"
-    small = gap.p_value_after < LEVEL
-    return said + (", below the level: something is left." if small else ", so it is noise.")
+    said = (
+        "All tests again on what is left in the runs of the fit: noise alone makes as much with "
+        f"{by_chance}"
+    )
+    if gap.p_value_after >= LEVEL:
+        return f"{said}, so it is noise."
+    if gap.shows_after:
+        return f"{said}, below the level: something is left."
+    return f"{said}, below the level, but no single test stands out far enough to tell what."
 
 
 def runs_words(diagnosis: Diagnosis) -> str:
