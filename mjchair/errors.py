@@ -24,6 +24,7 @@ OTHER_WORDS = {
     "rider": "occupant",
     "user": "occupant",
     "person": "occupant",
+    "weight": "mass",
 }
 
 
@@ -47,14 +48,16 @@ def closest(name: str, known: Iterable[str]) -> str | None:
     with: `left_wheel_torque` is not near `left_wheel_tire.Mz`.
     """
     names = sorted(known)
-    words = _words(name)
+    words, meant = _words(name), [name]
     for number, word in enumerate(words):
         if word in OTHER_WORDS:
             said = [*words[:number], *filter(None, [OTHER_WORDS[word]]), *words[number + 1 :]]
+            meant.append("_".join(said))
+            words = said if OTHER_WORDS[word] else words
             for candidate in names:
                 if _words(candidate) == said:
                     return candidate
-    best = max(((_likeness(name, n), n) for n in names), default=(0.0, ""))
+    best = max(((_likeness(m, n), n) for m in meant for n in names), default=(0.0, ""))
     return best[1] if best[0] >= ALIKE else None
 
 

@@ -142,6 +142,7 @@ def test_inputs_are_frozen():
         ("time,left_wheel\n0,inf\n", "infinite at 0 s"),
         ("time,left_wheel\n0,\n1,\n", "left_wheel has no samples"),
         ("time,left_wheel\n0,x\n", "row 2, column 'left_wheel': 'x' is not a number"),
+        ('time,left_wheel\n"0,5",1\n', "'0,5' is not a number; a decimal comma is read where semi"),
         ("time,left_wheel\n0,1,2\n", "row 2 has 3 cells; the header has 2"),
         ("# me\ntime,left_wheel\n0,1\n", "the header has 1; a comma, a semicolon or a tab"),
         ("time left_wheel\n0 1\n", "a comma, a semicolon or a tab parts the cells"),

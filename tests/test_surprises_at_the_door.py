@@ -94,7 +94,9 @@ def test_the_nearest_name_is_one_that_may_be_meant(said, meant, manual):
 @pytest.mark.parametrize("word", ["rider", "user", "person"])
 def test_who_sits_in_the_chair_is_the_occupant(word):
     """`chair_mass` was proposed, which is the mass of something else."""
-    assert closest(f"{word}_mass", ["chair_mass", "occupant_mass", "wheel_mass"]) == "occupant_mass"
+    known = ["chair_mass", "occupant_mass", "wheel_mass", "seat_height", "occupant_height"]
+    assert closest(f"{word}_mass", known) == "occupant_mass"
+    assert closest(f"{word}_weight", known) == closest("ocupant_weight", known) == "occupant_mass"
 
 
 def test_a_table_of_semicolons_and_decimal_commas_is_read(tmp_path):
