@@ -396,6 +396,13 @@ def test_how_probable_a_lone_effect_is_stands_in_the_first_sentence():
     assert "the evidence is thin" in first_screen.missing(found)
 
 
+def test_the_page_says_the_verdict_and_what_its_sizes_are():
+    for verdict, sizes in ((Verdict.NAMED, True), (Verdict.UNKNOWN, False)):
+        html = page(diagnosis(verdict), {})
+        assert f"Verdict: {verdict}." in html
+        assert ("± is one standard error" in html) == sizes
+
+
 def test_rivals_are_in_the_first_sentence():
     sets = [["floor_slope", "rolling_resistance"]]
     said = first_screen.missing(

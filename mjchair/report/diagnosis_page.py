@@ -133,6 +133,7 @@ def page(
         .get_template(TEMPLATE)
         .render(
             title=title,
+            verdict=str(diagnosis.verdict),
             first=first_screen(diagnosis),
             said=said,
             tables=tables,
