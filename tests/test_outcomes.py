@@ -10,7 +10,7 @@ from mjchair.cli import main
 from mjchair.errors import MjchairError, MjchairNote
 from mjchair.measurement import samples
 from mjchair.measurement.gather.gather import gather
-from mjchair.measurement.outcomes import UNITS, Outcomes, of_recording, outcomes, read_rim
+from mjchair.measurement.outcomes import UNITS, Outcomes, Rim, of_recording, outcomes, read_rim
 
 TOLERANCE = {"rtol": 1e-6, "atol": 1e-6}
 
@@ -90,6 +90,22 @@ def test_angle_speed_and_moment_are_kinetics_toolkits(theirs):
 def simulated():
     pushes = mjchair.push_strokes({"left_wheel": 12.0, "right_wheel": 12.0}, duration=3.0)
     return mjchair.simulate(mjchair.load_spec("manual"), pushes, initial={"speed": 0.8})
+
+
+def test_a_rim_that_rings_as_it_is_let_go_makes_no_push_and_ends_none():
+    """Of eight strokes of a sprint, each followed by a swing of 2 N m, two were counted."""
+    time = np.arange(0.0, 8.0, 1.0 / 240.0)
+    phase = time % 1.0
+    moment = np.where(phase < 0.4, 30.0 * np.sin(np.pi * phase / 0.4), 0.0)
+    let_go = (phase > 0.4) & (phase < 0.48)
+    moment = np.where(let_go, 2.0 * np.sin(2.0 * np.pi * (phase - 0.4) / 0.04), moment)
+    moment = np.where(time > 7.5, -8.0, moment)  # a hand that brakes
+    angle, speed = 4.0 * time, np.full(time.size, 4.0)
+    for way in (1.0, -1.0):
+        rim = Rim(time, way * angle, way * speed, way * moment, None, "wheel")
+        found = outcomes(rim)
+        assert len(found) == 8 and found.smaller == 0
+        assert found["push_time"] == pytest.approx(0.4, abs=0.05)
 
 
 def test_a_simulated_run_has_the_outcomes_of_the_pushes_that_made_it(simulated):

@@ -7,8 +7,9 @@ power, work, contact angle, and how the speed changes within the stroke.
 Strokes are cut as Kinetics Toolkit's `cycles.detect_cycles` cuts them, with the thresholds of its
 push-rim tutorial: a push begins where the hand's force rises to 5 N and ends where it falls to 2 N;
 a phase of less than 0.1 s or a push whose peak is below 25 N is none. Without a force the moment
-stands for it, on a push rim of 0.27 m; a hand's total force is larger than its part along the rim,
-so that this counts fewer pushes.
+stands for it, on a push rim of 0.27 m, as far as it drives, and a rim that rings as it is let go is
+not touched again. A hand's total force is larger than its part along the rim, so that this counts
+fewer pushes.
 """
 
 from __future__ import annotations
@@ -202,18 +203,35 @@ def strokes(rim: Rim) -> list[Stroke]:
 def _pushes(rim: Rim) -> list[tuple[Stroke, bool]]:
     """Every stroke that is long enough, and whether its push reaches what one must reach."""
     scale = 1.0 if rim.force is not None else RIM
-    hand = rim.force if rim.force is not None else np.abs(rim.moment)
+    hand = rim.force if rim.force is not None else _driving(rim.moment)
     events = _crossings(np.asarray(hand), RISES * scale, FALLS * scale)
+    touches = [
+        (begin, release, float(np.max(hand[begin : release + 1])) >= PEAK * scale)
+        for begin, release in zip(events[::2], events[1::2], strict=False)
+    ]
+    if rim.force is None:  # a rim rings as it is let go, which is no next push
+        touches = [
+            (begin, release, high)
+            for begin, release, high in touches
+            if high or rim.time[release] - rim.time[begin] >= SHORTEST
+        ]
+    begins = [begin for begin, _, _ in touches] + (events[-1:] if len(events) % 2 else [])
     found = []
-    for i in range(0, len(events) - 1, 2):
-        begin, release = events[i], events[i + 1]
-        end = events[i + 2] if i + 2 < len(events) else -1
+    for i, (begin, release, high) in enumerate(touches):
+        end = begins[i + 1] if i + 1 < len(begins) else -1
         push = rim.time[release] - rim.time[begin]
         recovery = rim.time[end] - rim.time[release] if end >= 0 else np.inf
-        high = float(np.max(hand[begin : release + 1])) >= PEAK * scale
         if push >= SHORTEST and recovery >= SHORTEST:
             found.append((Stroke(begin, release, end), high))
     return found
+
+
+def _driving(moment: Array) -> Array:
+    """The part of a moment (n,) that drives: what brakes the wheel, as a hand lets go, is no push.
+
+    It drives the way in which it acts in all: forward, but for a run that goes back.
+    """
+    return np.maximum(moment * np.sign(moment.sum()), 0.0)
 
 
 def _crossings(hand: Array, rises: float, falls: float) -> list[int]:
