@@ -231,7 +231,7 @@ def _driving(moment: Array) -> Array:
 
     It drives the way in which it acts in all: forward, but for a run that goes back.
     """
-    return np.maximum(moment * np.sign(moment.sum()), 0.0)
+    return np.asarray(np.maximum(moment * np.sign(moment.sum()), 0.0))
 
 
 def _crossings(hand: Array, rises: float, falls: float) -> list[int]:
