@@ -232,12 +232,12 @@ LIBRARY = (  # simplest first
     Manoeuvre("fast slalom", _WAVES.format(1.7), 1.0, torque=_slalom(1.0 / 1.7)),
     Manoeuvre(
         "short steps",
-        "Drive straight from a standstill, torque on and off, 0.5 s each",
+        "From a standstill go straight by short pushes, 0.5 s on and 0.5 s off",
         torque=_steps(0.5),
     ),
     Manoeuvre(
         "long steps",
-        "Drive straight from a standstill, torque on and off, 2 s each",
+        "From a standstill drive straight, torque on and off, 2 s each",
         torque=_steps(2.0),
         motor=True,
     ),

@@ -74,6 +74,7 @@ def caption(diagnosis: Diagnosis) -> str:
     kind = "that no fit has seen" if runs[0].held_out else "of the fit, since none is held out"
     return (
         f"Left: the run {runs[0].trial}, {kind}, simulated in one go from its first state with the "
-        "measured inputs. Right: what the windows of 2\N{NO-BREAK SPACE}s leave."
+        "measured inputs. Right: what the windows of 2\N{NO-BREAK SPACE}s leave, each from its own "
+        "fitted state, so that what adds up over a whole run does not show there."
         + (unforeseen_words(diagnosis) if diagnosis.effects else "")
     )

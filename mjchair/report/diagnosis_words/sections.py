@@ -92,6 +92,8 @@ def gap_words(diagnosis: Diagnosis) -> str:
 def driver_words(diagnosis: Diagnosis) -> str:
     """What introduces the table of what the force goes with."""
     if known_drivers(diagnosis):
+        if diagnosis.verdict == Verdict.NONE:
+            return "What is left, which does not matter, goes with:"
         return "What is left goes with:" if diagnosis.effects else "It goes with:"
     if diagnosis.effects:
         return "After the correction no force is left that goes with anything tested."
