@@ -688,6 +688,21 @@ def test_without_a_turn_measured_nothing_is_said_of_turning():
     ]
 
 
+def test_what_a_force_goes_with_is_said_beside_a_moment_that_may_be_all():
+    """A strap that held in left turns came as a moment of one run, and no more was said."""
+    found = Diagnosis(verdict=Verdict.UNKNOWN, moment=Moment(trial="run2", begin=0, end=2))
+
+    def driver(quantity, sigmas, trial=""):
+        return MissingForce(force=Force.YAW, goes_with=Driver(quantity, trial), sigmas=sigmas)
+
+    found.drivers = [driver(Quantity.TIME, 24.0, "run2"), driver(Quantity.YAW_RATE, 5.6)]
+    assert first_screen.missing(found).endswith(
+        "so nothing is named. The yaw moment that is missing goes with yaw rate."
+    )
+    found.drivers[1] = driver(Quantity.YAW_RATE, 4.9)
+    assert first_screen.missing(found).endswith("so nothing is named.")
+
+
 def test_a_number_at_the_end_of_what_is_believed_is_why_nothing_is_named():
     """Of a pushed chair taken to coast, a rolling resistance of -0.01 stood in an answer."""
     found = Diagnosis(

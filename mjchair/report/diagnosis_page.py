@@ -20,7 +20,6 @@ from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
 from mjchair.diagnosis.next_experiment.wording import plain, roughly_known
-from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.result import Candidate, Diagnosis
 from mjchair.effects.library import find
 from mjchair.errors import MjchairError
@@ -36,7 +35,7 @@ from mjchair.report.diagnosis_figures import (
 )
 from mjchair.report.diagnosis_words import sections
 from mjchair.report.diagnosis_words.first_screen import first_screen, next_step
-from mjchair.report.diagnosis_words.forces import known_drivers, regime
+from mjchair.report.diagnosis_words.forces import FORCES, known_drivers, regime
 from mjchair.report.diagnosis_words.names import open_upwards
 from mjchair.units import per_cent
 
@@ -196,11 +195,10 @@ def _cells(diagnosis: Diagnosis) -> Table:
 
 
 def _drivers(diagnosis: Diagnosis) -> Table:
-    names = {Force.FORWARD: "forward force", Force.YAW: "yaw moment"}
     rows = [
         Row(
             [
-                names.get(d.force, d.force),
+                FORCES.get(d.force, d.force),
                 plain(str(d.goes_with)),
                 f"{d.sigmas:.1f}",
             ]

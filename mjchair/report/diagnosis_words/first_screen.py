@@ -11,7 +11,7 @@ from mjchair.diagnosis.explain.calibration import NONE, OUTSIDE
 from mjchair.diagnosis.explain.probability import ONE_RUN, of_effects
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.next_experiment.wording import MEASURED, measured, plain
-from mjchair.diagnosis.result import Diagnosis, GapSummary, Moment, NamedEffect, OneRun
+from mjchair.diagnosis.result import Diagnosis, GapSummary, Moment, NamedEffect, Nearest, OneRun
 from mjchair.diagnosis.rules import LEVEL, LIKELY, PROBABLE, Verdict
 from mjchair.report.diagnosis_words.explanations import (
     Explanation,
@@ -22,7 +22,7 @@ from mjchair.report.diagnosis_words.explanations import (
     one_from_another,
     settled,
 )
-from mjchair.report.diagnosis_words.forces import clear_turns, known_drivers
+from mjchair.report.diagnosis_words.forces import clear_turns, goes_with, known_drivers
 from mjchair.report.diagnosis_words.names import (
     capital,
     chance,
@@ -76,22 +76,25 @@ def missing(diagnosis: Diagnosis) -> str:
 
 def _unexplained(diagnosis: Diagnosis) -> str:
     """That nothing is named: where it happened, or what is the most probable if that is known."""
+    goes = goes_with(diagnosis)
+    goes = f" {capital(goes)}." if goes else ""
     if diagnosis.moment is not None:
-        return _moment_words(diagnosis.moment)
+        return _moment_words(diagnosis.moment) + goes
     first = next(iter(explanations(diagnosis)), None)
     if first is None or first.name in (NONE, OUTSIDE, ONE_RUN):
-        return "A force is missing that no effect of the library explains, so none is named."
-    near = diagnosis.nearest
-    why = "it explains too little of these runs, or not all of them"
-    if near is not None and near.ends and "+".join(sorted(near.effects)) == first.name:
-        ends = " and ".join(
-            f"the {plain(number)} of {plain(effect)}" for effect, number in near.ends
-        )
-        why = f"only with {ends} at the end of what is believed of it"
+        return f"A force is missing that no effect of the library explains, so none is named.{goes}"
     return (
         f"Something is missing. Of the library {hypothesis_words(first.name)} is the most "
-        f"probable, but {why}, so nothing is named."
+        f"probable, but {_why_no_answer(diagnosis.nearest, first.name)}, so nothing is named.{goes}"
     )
+
+
+def _why_no_answer(near: Nearest | None, name: str) -> str:
+    """Why a hypothesis is no answer, as a clause."""
+    if near is None or not near.ends or "+".join(sorted(near.effects)) != name:
+        return "it explains too little of these runs, or not all of them"
+    ends = " and ".join(f"the {plain(number)} of {plain(effect)}" for effect, number in near.ends)
+    return f"only with {ends} at the end of what is believed of it"
 
 
 def _moment_words(moment: Moment) -> str:

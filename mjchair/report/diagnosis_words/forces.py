@@ -14,6 +14,9 @@ from mjchair.diagnosis.result import Diagnosis, Disagreement, Estimate, MissingF
 # what a force may go with that is not known where nothing tells how the chair turns
 TURNING = (Quantity.YAW_RATE, Quantity.HEADING, Quantity.SWIVEL, Quantity.RIGHT_TURN)
 TURNS = {"wheel_turn": str(Part.WHEEL_TURN), "caster_turn": str(Part.CASTER_TURN)}
+FORCES = {Force.FORWARD: "forward force", Force.YAW: "yaw moment"}
+STANDS_OUT = 5.0  # sigmas, from which the first screen says what a force goes with
+TOLD = 2  # of these
 CLEAR = 0.5  # of what shakes the chair forward: a force once a turn of this size is told
 
 
@@ -36,6 +39,20 @@ def known_drivers(diagnosis: Diagnosis) -> list[MissingForce]:
         for d in diagnosis.drivers
         if d.force == Force.FORWARD and d.goes_with.quantity not in TURNING
     ]
+
+
+def goes_with(diagnosis: Diagnosis) -> str:
+    """What the force that shows most goes with besides the time, as a clause; empty: nothing."""
+    clear = [
+        d
+        for d in known_drivers(diagnosis)
+        if d.sigmas > STANDS_OUT and d.goes_with.quantity != Quantity.TIME
+    ]
+    if not clear:
+        return ""
+    force = clear[0].force
+    drivers = [plain(str(d.goes_with)) for d in clear if d.force == force][:TOLD]
+    return f"the {FORCES.get(force, force)} that is missing goes with {' or '.join(drivers)}"
 
 
 def regime(diagnosis: Diagnosis, cell: Disagreement) -> str:
