@@ -184,7 +184,9 @@ def _number(cell: str | None, where: str) -> float | None:
     try:
         return float(cell)
     except ValueError:
-        several = f"; {MARKS}" if len(cell.split()) > 1 else ""
-        if cell.count(",") == 1 and not several:
-            several = "; a decimal comma is read where semicolons part the cells of a row"
-        raise MjchairError(f"{where}: {cell[:30]!r} is not a number{several}") from None
+        hint = ""
+        if len(cell.split()) > 1:
+            hint = f"; {MARKS}"
+        elif cell.count(",") == 1:
+            hint = "; a decimal comma is read where semicolons part the cells of a row"
+        raise MjchairError(f"{where}: {cell[:30]!r} is not a number{hint}") from None

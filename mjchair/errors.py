@@ -52,11 +52,12 @@ def closest(name: str, known: Iterable[str]) -> str | None:
     for number, word in enumerate(words):
         if word in OTHER_WORDS:
             said = [*words[:number], *filter(None, [OTHER_WORDS[word]]), *words[number + 1 :]]
-            meant.append("_".join(said))
-            words = said if OTHER_WORDS[word] else words
             for candidate in names:
                 if _words(candidate) == said:
                     return candidate
+            if OTHER_WORDS[word]:
+                words = said
+                meant.append("_".join(said))
     best = max(((_likeness(m, n), n) for m in meant for n in names), default=(0.0, ""))
     return best[1] if best[0] >= ALIKE else None
 

@@ -373,6 +373,13 @@ def test_a_steady_force_that_may_hide_is_said_before_a_name():
     assert found.to_dict()["loud"] == ["drive"]
 
 
+def test_what_is_left_goes_with_words_and_no_name_of_the_code():
+    found = Diagnosis(verdict=Verdict.NAMED, effects=[ROLLING], more_missing=True)
+    yaw = Driver(Quantity.YAW_RATE)
+    found.drivers = [MissingForce(force=Force.YAW, goes_with=yaw, sigmas=9.0)]
+    assert "What is left goes with yaw rate. " in first_screen.missing(found)
+
+
 def test_what_tests_say_of_what_is_left_agrees_with_what_is_named_of_it():
     gap = GapSummary(before=3.0, after=0.9, scope="", p_value=0.0, p_value_after=0.002)
     found = Diagnosis(verdict=Verdict.NAMED, effects=[ROLLING], gap=gap)
@@ -715,6 +722,7 @@ def test_a_number_at_the_end_of_what_is_believed_is_why_nothing_is_named():
     found.nearest = near
     said = first_screen.missing(found)
     assert "but only with the coefficient of rolling resistance at the end of what is" in said
+    assert "has no number at the end of what is believed of it" in sections.choice_words(found)
     found.nearest = dataclasses.replace(near, ends=())
     assert "it explains too little" in first_screen.missing(found)
     found.nearest = dataclasses.replace(near, effects=("floor_slope",))

@@ -97,6 +97,7 @@ def test_who_sits_in_the_chair_is_the_occupant(word):
     known = ["chair_mass", "occupant_mass", "wheel_mass", "seat_height", "occupant_height"]
     assert closest(f"{word}_mass", known) == "occupant_mass"
     assert closest(f"{word}_weight", known) == closest("ocupant_weight", known) == "occupant_mass"
+    assert closest("left_wheel_torque", ["left_wheel_speed", "imu_gyro.z"]) is None
 
 
 def test_a_table_of_semicolons_and_decimal_commas_is_read(tmp_path):

@@ -451,9 +451,8 @@ def _found_effect(
 def _candidates(base: Base, gap: Gap, choice: Choice | None) -> list[Candidate]:
     """Every effect alone, as it was screened."""
     out = []
-    # nothing closes what is not there
     shown = max([gap.excess, 1.0, *(t.statistic - t.dof for t in gap.tests)])
-    excess = shown if gap.exists else math.inf
+    excess = shown if gap.exists else math.inf  # nothing closes what is not there
     total = max(gain(base, choice.fitted), excess) if choice else excess
     for h in hypotheses.singles(base.reduced, base.starts):
         columns = base.system.index(h.columns)

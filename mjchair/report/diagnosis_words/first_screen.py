@@ -229,7 +229,7 @@ def _left(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"It does so only with a chair at the end of what the study allows ({ends})."
     known = known_drivers(diagnosis)
     if known:
-        yield f"What is left goes with {known[0].goes_with}."
+        yield f"What is left goes with {plain(str(known[0].goes_with))}."
 
 
 def _loud(diagnosis: Diagnosis) -> list[str]:

@@ -124,8 +124,9 @@ def choice_words(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == Verdict.AMBIGUOUS:
         return _open_words(diagnosis)
     rules = (
-        f"None is named. An answer closes at least {per_cent(PARTLY)} of the gap and holds on "
-        f"{other_runs(diagnosis)}; no effect, nor two or three together, does both. "
+        f"None is named. An answer closes at least {per_cent(PARTLY)} of the gap, holds on "
+        f"{other_runs(diagnosis)}, and has no number at the end of what is believed of it; no "
+        "effect, nor two or three together, does all of this. "
     )
     if diagnosis.one_run is not None:
         return f"{one_run_words(diagnosis.one_run)} Section 2 is what is known of it."
