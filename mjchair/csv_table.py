@@ -2,7 +2,8 @@
 
 In: the bytes of a file with a header and rows, or the rows alone with the names of their columns; a
 comma, a semicolon or a tab between cells, and a decimal comma where no comma is between them.
-Out: the header and a float64 array for each column, NaN for an empty cell.
+Out: the header and a float64 array for each column, NaN for a missing sample: an empty
+cell, or one with NaN or NA.
 """
 
 from __future__ import annotations
@@ -58,6 +59,8 @@ def read_columns(
     return names, numbers(rows, names, wanted)
 
 
+# cells of a missing sample, in lower case: empty, or as MATLAB, pandas and R write it
+MISSING = ("", "nan", "na")
 MARKS = "a comma, a semicolon or a tab parts the cells of a row"
 
 
@@ -67,8 +70,7 @@ class Rows:
 
     Attributes:
       text: the rows. source: the file, for error lines. delimiter: between the cells. decimal: the
-      mark in a number, "." or ",". before: rows of the file before these. missing: words that stand
-      for a missing sample as an empty cell does, in lower case.
+      mark in a number, "." or ",". before: rows of the file before these.
     """
 
     text: str
@@ -76,7 +78,6 @@ class Rows:
     delimiter: str
     decimal: str
     before: int
-    missing: tuple[str, ...] = ()
 
 
 def numbers(
@@ -155,8 +156,8 @@ def _numbers(column: Any, rows: Rows, name: str) -> Array:
         return f"{rows.source}: row {row + 1 + rows.before}, column {name!r}"
 
     column = pyarrow.compute.utf8_trim_whitespace(column)
-    empty = pyarrow.array(["", *rows.missing])
-    blank = pyarrow.compute.is_in(pyarrow.compute.utf8_lower(column), value_set=empty)
+    missing = pyarrow.array(MISSING)
+    blank = pyarrow.compute.is_in(pyarrow.compute.utf8_lower(column), value_set=missing)
     column = pyarrow.compute.if_else(blank, None, column)
     if rows.decimal == ",":
         column = pyarrow.compute.replace_substring(column, ",", ".")
@@ -167,15 +168,7 @@ def _numbers(column: Any, rows: Rows, name: str) -> Array:
         values = pyarrow.array(
             [_number(cell, where(row)) for row, cell in cells], pyarrow.float64()
         )
-    array = values.to_numpy(zero_copy_only=False).astype(np.float64)
-    there = pyarrow.compute.is_valid(column).to_numpy(zero_copy_only=False)
-    bad = np.flatnonzero(np.isnan(array) & there)
-    if bad.size:
-        cell = column[int(bad[0])].as_py()
-        raise MjchairError(
-            f"{where(int(bad[0]))}: {cell!r}; leave the cell of a missing sample empty"
-        )
-    return np.asarray(array)
+    return np.asarray(values.to_numpy(zero_copy_only=False), np.float64)
 
 
 def _number(cell: str | None, where: str) -> float | None:

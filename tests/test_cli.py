@@ -82,7 +82,7 @@ def test_nothing_is_overwritten_without_force(there, capsys):
 BAD = {
     "missing file": (["--input", "driv.csv"], "no file driv.csv; did you mean 'drive.csv'"),
     "decreasing time": (["--input", "back.csv"], "time goes from 1 to 0.5 s"),
-    "nan": (["--input", "nan.csv"], "leave the cell of a missing sample empty"),
+    "infinite": (["--input", "inf.csv"], "leave the cell of a missing sample empty"),
     "unknown channel": (["--input", "name.csv"], "did you mean 'left_wheel'"),
     "unknown unit": (["--input", "unit.csv"], "unknown unit 'lbf'"),
     "unknown model": (["--model", "manul"], "unknown model 'manul'; did you mean 'manual'"),
@@ -122,7 +122,7 @@ BAD = {
 @pytest.fixture
 def bad_files(there):
     write(there / "back.csv", "time,left_wheel\n0,1\n1,1\n0.5,1\n")
-    write(there / "nan.csv", "time,left_wheel\n0,nan\n")
+    write(there / "inf.csv", "time,left_wheel\n0,inf\n")
     write(there / "name.csv", "time,left_whel\n0,1\n")
     write(there / "unit.csv", "time,left_wheel [lbf]\n0,1\n")
     chair = mjchair.load_spec("manual").to_xml()

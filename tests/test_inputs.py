@@ -138,7 +138,7 @@ def test_inputs_are_frozen():
             "if the samples came evenly, k / 200 s for sample k",
         ),
         ("time,left_wheel\n0,1\n,1\n", "every sample needs a time"),
-        ("time,left_wheel\n0,nan\n", "leave the cell of a missing sample empty"),
+        ("time,left_wheel\n0,nan\n", "left_wheel has no samples"),
         ("time,left_wheel\n0,inf\n", "infinite at 0 s"),
         ("time,left_wheel\n0,\n1,\n", "left_wheel has no samples"),
         ("time,left_wheel\n0,x\n", "row 2, column 'left_wheel': 'x' is not a number"),

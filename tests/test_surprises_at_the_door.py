@@ -137,7 +137,8 @@ def test_milliseconds_are_recognised_and_told_how_to_write(tmp_path):
     [
         ("time,a\n0,1\n\n1,x\n", "row 3, column 'a': 'x' is not a number"),
         ("time,a\n0,1\n1\n", "row 3 has 1 cells; the header has 2"),
-        ("time,a\n0,nan\n", "row 2, column 'a': 'nan'; leave the cell"),
+        ("time,a\n0,inf\n", "infinite at 0 s; leave the cell of a missing sample empty"),
+        ("time,a\nNaN,1\n", "every sample needs a time"),
         ("\n \n", "empty"),
     ],
 )
@@ -146,6 +147,14 @@ def test_a_bad_cell_is_named_by_row_and_column(tmp_path, text, line):
         read_table(write(tmp_path / "a.csv", text))
     values = read_table(write(tmp_path / "b.csv", 'time, a\r\n0,+5\r\n1," 2.5 "\r\n2,\r\n')).columns
     np.testing.assert_array_equal(values["a"], [5.0, 2.5, np.nan])
+
+
+@pytest.mark.parametrize("word", ["", "NaN", "nan", "NA", " NaN "])
+def test_a_missing_sample_is_empty_or_written_as_matlab_pandas_and_r_do(tmp_path, word):
+    rows = f"time,a,b\n0,1,+3\n1,{word},4\n"
+    values = read_table(write(tmp_path / "a.csv", rows)).columns
+    np.testing.assert_array_equal(values["a"], [1.0, np.nan])
+    np.testing.assert_array_equal(values["b"], [3.0, 4.0])
 
 
 def test_held_inputs_keep_their_value_until_the_next_sample():

@@ -2,8 +2,8 @@
 
 In: a text file. Where its numbers begin, what separates them and how the columns are called is
 found out here; mjchair.csv_table reads the numbers. Out: the column names, if there are any, and
-the numbers as an array; an empty cell is NaN, and so is one with the word NaN. Between the
-first and the last row of numbers there is nothing else.
+the numbers as an array; a missing sample is NaN. Between the first and the last
+row of numbers there is nothing else.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Delimited:
 
     Attributes:
       header: column names, in order; empty where the file has none. values: (n, columns), NaN where
-      a cell is empty or NaN. first: line of the file (from 1) with the first row. preamble: the
+      a sample is missing. first: line of the file (from 1) with the first row. preamble: the
       lines before the header. source: the file.
     """
 
@@ -91,7 +91,7 @@ def _values(
     if body[0].endswith(separator):  # it closes the last cell
         body = [line.removesuffix(separator) for line in body]
     decimal = _decimal(body, separator)
-    rows = Rows("\n".join(body), source, separator, decimal, before=start, missing=("nan",))
+    rows = Rows("\n".join(body), source, separator, decimal, before=start)
     columns = [column for column in numbers(rows, names) if column is not None]
     return np.column_stack(columns)
 
