@@ -27,7 +27,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from calibration_studies import MADE, Kept
+from calibration_studies import MADE, SHAPED, Kept
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
@@ -56,7 +56,7 @@ from mjchair.diagnosis.explain.screening import silent
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.bounded import Reduced
 from mjchair.diagnosis.fit.column_ids import ParameterId
-from mjchair.diagnosis.fit.process import KINDS, Part
+from mjchair.diagnosis.fit.process import KINDS
 from mjchair.diagnosis.fit.system import System
 from mjchair.effects.effect import step
 
@@ -320,20 +320,24 @@ def _noise(bed: Bed, rng: np.random.Generator) -> list[Array]:
     sensor = np.exp(SENSORS * rng.standard_normal((2, channels)))
     runs = len(bed.kept.manoeuvres)
     out = []
-    parts = {
-        p: (
-            bed.kept.levels[str(p)] * np.exp(LEVELS * rng.standard_normal())
-            * np.exp(RUNS * rng.standard_normal(runs)),
-            kind.time * math.exp(COLOURS * rng.standard_normal()),
-        )
+    levels = {
+        p: bed.kept.levels[str(p)]
+        * np.exp(LEVELS * rng.standard_normal())
+        * np.exp(RUNS * rng.standard_normal(runs))
+        for p in KINDS
+    }
+    times = {
+        p: kind.time * math.exp(COLOURS * rng.standard_normal())
         for p, kind in KINDS.items()
-        if p != Part.PERSON  # its force is not kept with the studies
-    }  # fmt: skip
+        if p not in SHAPED
+    }
     for b in bed.blocks:
         e = sensor[0][b.channel] * rng.standard_normal(len(b.J))
         e = np.where(b.frequency < SLOW_HZ, e * sensor[1][b.channel], e)
-        for p, (level, time) in parts.items():
-            e += _coloured(b, {KINDS[p].force: (float(level[b.run]), time)}, rng)
+        for p, time in times.items():
+            e += _coloured(b, {KINDS[p].force: (float(levels[p][b.run]), time)}, rng)
+        for p, columns in b.shaped.items():
+            e += levels[p][b.run] * columns @ rng.standard_normal(columns.shape[1])
         out.append(e)
     return out
 

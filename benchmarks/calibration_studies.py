@@ -40,8 +40,10 @@ from mjchair.diagnosis.explain.fits import Fits
 from mjchair.diagnosis.explain.probability import OUTSIDE, weights
 from mjchair.diagnosis.explain.screening import Base, gap_after, prepare, screen_columns, silent
 from mjchair.diagnosis.explain.selection import choose
+from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ColumnId
 from mjchair.diagnosis.fit.elimination import eliminate_window
+from mjchair.diagnosis.fit.process import KINDS, TURNING, Part
 from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.replay.sampling import residual
 from mjchair.effects.library import find
@@ -51,6 +53,7 @@ Array = NDArray[np.float64]
 SEED = 900
 NOISES = 12  # runs of the planar chair with nothing hidden
 FORCES = (Force.FORWARD, Force.LEFTWARD, Force.YAW)
+SHAPED = (Part.PERSON, *TURNING)  # parts of the process that a time alone does not correlate
 FEW = ("left_wheel_speed", "right_wheel_speed", "imu_gyro.z", "imu_accelerometer.x")
 
 
@@ -93,8 +96,8 @@ class Block:
     Attributes:
       J: (n, p) nuisances, then effects and forces. Z: (n, k) of its state and its disturbances,
         with prior precision (k,). strange: (n, m) of forces that no effect of the library makes.
-      pulses: force -> (times (q,), s; white answers (n, q)). channel, frequency: (n,), of each row.
-      run: index of its run.
+      pulses: force -> (times (q,), s; white answers (n, q)). shaped: part of the process -> white
+        columns (n, q) of level 1. channel, frequency: (n,), of each row. run: index of its run.
     """
 
     J: Array
@@ -103,6 +106,7 @@ class Block:
     states: int
     strange: Array
     pulses: dict[Force, tuple[Array, Array]]
+    shaped: dict[Part, Array]
     channel: NDArray[np.int64]
     frequency: Array
     run: int
@@ -217,6 +221,7 @@ def keep(name: str, base: Base) -> Kept:
                 states=white.states,
                 strange=white.J[:, len(columns) :],
                 pulses=pulses,
+                shaped={part: _shaped(bench, i, part) for part in SHAPED},
                 channel=bench.whitener.channel[i],
                 frequency=bench.whitener.frequency[i],
                 run=w.run,
@@ -237,6 +242,16 @@ def keep(name: str, base: Base) -> Kept:
         manoeuvres=[r.manoeuvre for r in bench.simulator.study.runs],
         levels={str(p): v for p, v in bench.process.levels.items()},
     )
+
+
+def _shaped(bench: Bench, window: int, part: Part) -> Array:
+    """White columns (n, q) of a part of the process of level 1, each of one standard deviation."""
+    assert bench.process is not None
+    which = bench.process.members(window, KINDS[part].force)
+    cover = bench.process.correlation(which, part)
+    small = 1e-9 * max(float(np.trace(cover)), 1e-12)
+    root = np.linalg.cholesky(cover + small * np.eye(len(which)))
+    return bench.process.answers_of(window, which, bench.whitener) @ root
 
 
 def add_planar(kept: Kept, base: Base, made: Made) -> None:

@@ -294,7 +294,7 @@ SHAPES = ("rolling_resistance", "air_drag", "toe", "caster_trail", "turning_scru
 def made_up_bed():
     """A base study of smooth random columns, of which two are much alike; none was fitted to."""
     from calibration_draws import Bed
-    from calibration_studies import FORCES, Block, Kept
+    from calibration_studies import FORCES, SHAPED, Block, Kept
 
     rng = np.random.default_rng(3)
     starts = [start(name) for name in SHAPES]
@@ -316,6 +316,7 @@ def made_up_bed():
                 states=2,
                 strange=strange,
                 pulses={f: (at, rng.standard_normal((80, 6)) / 5.0) for f in FORCES},
+                shaped={p: rng.standard_normal((80, 2)) / 5.0 for p in SHAPED},
                 channel=np.repeat([0, 1], 40),
                 frequency=np.tile(np.arange(40) / 4.0, 2),
                 run=k // 2,
@@ -337,6 +338,13 @@ def made_up_bed():
             levels={str(p): np.full(3, 0.3) for p in KINDS},
         )
     )
+
+
+def test_no_part_of_the_noise_is_drawn_by_a_time_that_it_does_not_have():
+    """A force once a turn, of no correlation time, was drawn as one that holds for a window."""
+    from calibration_studies import SHAPED
+
+    assert {p for p, kind in KINDS.items() if not math.isfinite(kind.time)} < set(SHAPED)
 
 
 def test_probabilities_of_chosen_effects_come_true_as_often_as_they_say():
