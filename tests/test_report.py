@@ -504,6 +504,13 @@ def test_no_name_where_none_is_named(verdict):
     assert "resistance" not in first_screen.missing(Diagnosis(verdict=verdict))
 
 
+@pytest.mark.parametrize("verdict", list(Verdict))
+def test_a_picture_of_missing_force_says_where_nothing_is_missing(verdict):
+    """Curves of force under the verdict that nothing is missing were not explained."""
+    said = missing_force.caption(diagnosis(verdict))
+    assert ("Nothing is missing that matters" in said) == (verdict == Verdict.NONE)
+
+
 def test_words_from_outside_are_escaped():
     html = page(Diagnosis(verdict=Verdict.NAMED, effects=[BIAS]), {}, "<i>title</i> & more")
     assert "&lt;m/s&gt;" in html and "sensor of imu_gyro.z shows" in html

@@ -140,7 +140,7 @@ def page(
             captions={
                 "summary": summary.caption(diagnosis),
                 "where": where.caption(diagnosis),
-                "force": missing_force.CAPTION,
+                "force": missing_force.caption(diagnosis),
                 "compared": whole_runs.CAPTION,
             },
             pictures={name: base64.b64encode(image).decode() for name, image in drawn.items()},

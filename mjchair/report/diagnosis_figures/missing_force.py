@@ -12,14 +12,11 @@ from matplotlib.axes import Axes
 from mjchair.diagnosis.explain.column_ids import Quantity
 from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.result import Diagnosis, ForceLevels, ForceSamples
+from mjchair.diagnosis.rules import Verdict
 from mjchair.report.colours import AXIS_LINE, BEFORE
 from mjchair.report.diagnosis_words.forces import TURNING
 from mjchair.report.figure import Figure
 
-CAPTION = (
-    "Mean force that the runs ask for at each level, with its standard error; the levels of a "
-    "panel are fitted together, and nothing draws them towards zero."
-)
 LABELS = {  # what a force is drawn against
     Quantity.SPEED: "speed (m/s)",
     Quantity.YAW_RATE: "yaw rate (rad/s)",
@@ -59,6 +56,17 @@ def figure(diagnosis: Diagnosis) -> Figure | None:
             ax.set_axis_off()
         row[0].set_ylabel(f"{FORCES[name]}\n({force.unit})")
     return drawn
+
+
+def caption(diagnosis: Diagnosis) -> str:
+    """What the figure shows."""
+    shown = (
+        "Mean force that the runs ask for at each level, with its standard error; the levels of a "
+        "panel are fitted together, and nothing draws them towards zero."
+    )
+    if diagnosis.verdict == Verdict.NONE:
+        return f"{shown} Nothing is missing that matters: this is what noise leaves (section 1)."
+    return shown
 
 
 def _drivers(diagnosis: Diagnosis, name: Force, force: ForceSamples) -> list[Quantity]:
