@@ -36,8 +36,8 @@ AGAINST_NOTHING = 4.0
 LEAST = 1e-3  # a share of what a group of hypotheses has together that is listed
 LINES = ("effects", "rivalled", "remainder", "unchosen", NONE, OUTSIDE, "alone", "rest", "next")
 CLUES = (
-    "gained", "each_gained", "each_share", "over_tried", "over_untried", "share_tried",
-    "share_untried", "share_outside", "few", "prior",
+    "gained", "each_gained", "over_tried", "over_untried", "share_tried", "share_untried",
+    "share_outside", "few", "prior",
 )  # fmt: skip
 CLEAR = 2.0  # of the evidence: what is further ahead of a choice makes it no less sure
 FILE = Path(__file__).with_name("calibration.toml")
@@ -216,6 +216,7 @@ def clues(weights: Mapping[str, Weight], about: str) -> dict[str, float]:
 
     Those over others are logarithms of the evidence by which these are behind, with its sign; the
     shares are of the evidence for the choice. `each_gained`: what its least certain effect brings.
+    Of some of the chosen effects without the others that says all; they are no rivals besides.
     """
     mine, effects = weights[about].evidence, set(about.split("+"))
     others = {n: w for n, w in weights.items() if n != NONE and not holds(n, about)}
@@ -232,7 +233,6 @@ def clues(weights: Mapping[str, Weight], about: str) -> dict[str, float]:
     return {
         "gained": _log(max(mine, 0.0)),
         "each_gained": _log(mine - max(each, 0.0)),
-        "each_share": math.log(max(mine - max(each, 0.0), LEAST * mine, 1.0) / max(mine, 1.0)),
         "over_tried": _log(mine - tried),
         "over_untried": _log(mine - untried),
         "share_tried": share(tried),
