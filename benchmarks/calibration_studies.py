@@ -247,11 +247,8 @@ def keep(name: str, base: Base) -> Kept:
 def _shaped(bench: Bench, window: int, part: Part) -> Array:
     """White columns (n, q) of a part of the process of level 1, each of one standard deviation."""
     assert bench.process is not None
-    which = bench.process.members(window, KINDS[part].force)
-    cover = bench.process.correlation(which, part)
-    small = 1e-9 * max(float(np.trace(cover)), 1e-12)
-    root = np.linalg.cholesky(cover + small * np.eye(len(which)))
-    return bench.process.answers_of(window, which, bench.whitener) @ root
+    force = KINDS[part].force
+    return bench.process.force_columns(window, bench.whitener, force, {part: 1.0})
 
 
 def add_planar(kept: Kept, base: Base, made: Made) -> None:

@@ -216,7 +216,7 @@ def clues(weights: Mapping[str, Weight], about: str) -> dict[str, float]:
 
     Those over others are logarithms of the evidence by which these are behind, with its sign; the
     shares are of the evidence for the choice. `each_gained`: what its least certain effect brings.
-    Of some of the chosen effects without the others that says all; they are no rivals besides.
+    Some of the chosen effects without the others count in that alone, and not as rivals.
     """
     mine, effects = weights[about].evidence, set(about.split("+"))
     others = {n: w for n, w in weights.items() if n != NONE and not holds(n, about)}

@@ -163,27 +163,36 @@ class Process:
         return known[window]
 
     def _of_one_deviation(self, window: int, whitener: Whitener) -> Array:
-        out = []
         run = int(self.runs[window])
-        for force in SHAKEN:
-            which = self.members(window, force)
-            cover = sum(
-                (
-                    float(self.levels[part][run]) ** 2 * self.correlation(which, part)
-                    for part, kind in KINDS.items()
-                    if kind.force == force
-                ),
-                np.zeros((len(which), len(which))),
-            )
-            small = 1e-9 * max(float(np.trace(cover)), 1e-12)
-            root = np.linalg.cholesky(cover + small * np.eye(len(which)))
-            out.append(self.answers_of(window, which, whitener) @ root)
+        levels = {part: float(level[run]) for part, level in self.levels.items()}
+        out = [self.force_columns(window, whitener, force, levels) for force in SHAKEN]
         out += [
             size * self.wobble_columns(window, channel, whitener)
             for channel, size in self.wobbles.items()
             if size > 0.0
         ]
         return np.hstack(out)
+
+    def force_columns(
+        self, window: int, whitener: Whitener, force: Force, levels: Mapping[Part, float]
+    ) -> Array:
+        """Columns (amplitudes, k) of the parts of one force, each of one standard deviation.
+
+        Args:
+          levels: part -> its standard deviation in this window; parts that are not there are zero.
+        """
+        which = self.members(window, force)
+        cover = sum(
+            (
+                levels[part] ** 2 * self.correlation(which, part)
+                for part, kind in KINDS.items()
+                if kind.force == force and part in levels
+            ),
+            np.zeros((len(which), len(which))),
+        )
+        small = 1e-9 * max(float(np.trace(cover)), 1e-12)
+        root = np.linalg.cholesky(cover + small * np.eye(len(which)))
+        return self.answers_of(window, which, whitener) @ root
 
 
 def first(

@@ -65,7 +65,7 @@ def caption(diagnosis: Diagnosis) -> str:
         "panel are fitted together, and nothing draws them towards zero."
     )
     if diagnosis.verdict == Verdict.NONE:
-        return f"{shown} Nothing is missing that matters: this is what noise leaves (section 1)."
+        return f"{shown} Nothing is missing that matters (section 1)."
     return shown
 
 
