@@ -20,7 +20,8 @@ from mjchair.diagnosis.fit import process
 from mjchair.diagnosis.fit.nonlinear import refit
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.next_experiment import design, wording
-from mjchair.diagnosis.next_experiment.design import Evidence, Experiment, Plan, telling
+from mjchair.diagnosis.next_experiment.comparison import Evidence, Experiment
+from mjchair.diagnosis.next_experiment.design import Plan, telling
 from mjchair.diagnosis.next_experiment.manoeuvres import LIBRARY, Setting, possible, setting
 from mjchair.diagnosis.next_experiment.rehearsal import Rehearsal, Version
 from mjchair.diagnosis.replay.pulses import pulse_answers, pulses
@@ -138,6 +139,18 @@ def test_what_must_be_large_is_not_the_simplest(one_way):
     assert "repetitions" in wording.deciding(found, bench.simulator)
     simple = design.plan(bench, rolling, [slope], either, doubts=(), needed=[9.0])
     assert simple.best.least > design.PLENTY and simple.best.manoeuvre.name == "coast across"
+
+
+def test_no_torque_and_no_load_is_asked_for_where_a_coast_decides(one_way):
+    _, _, bench, (rolling, slope, _) = one_way
+    few = [BY_NAME["loaded coast"], BY_NAME["coast reversed"], BY_NAME["coast"]]
+    decided = design.plan(bench, rolling, [slope], few, doubts=())
+    assert [e.manoeuvre.name for e in decided.experiments] == ["coast reversed", "coast"]
+    assert decided.best.least > design.PLENTY
+    open_still = design.plan(bench, rolling, [slope], few, doubts=(), needed=[1e6])
+    assert {e.manoeuvre.name for e in open_still.experiments} == {m.name for m in few}
+    both = {e.manoeuvre.name: e.separations for e in open_still.experiments}
+    assert all(both[e.manoeuvre.name] == e.separations for e in decided.experiments)
 
 
 def test_nothing_separates_a_chair_from_itself(one_way):

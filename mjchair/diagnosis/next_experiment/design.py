@@ -14,32 +14,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
-from numpy.typing import NDArray
+from itertools import groupby
 
 from mjchair.diagnosis.fit.bench import Bench
-from mjchair.diagnosis.fit.column_ids import ColumnId
 from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.variant import Variant
-from mjchair.diagnosis.next_experiment.manoeuvres import Manoeuvre, possible, setting
-from mjchair.diagnosis.next_experiment.rehearsal import Rehearsal, Version, version
-from mjchair.diagnosis.next_experiment.separation import (
-    Doubts,
-    Separated,
-    nuisance_answers,
-    outside_answers,
-    separation,
+from mjchair.diagnosis.next_experiment.comparison import (
+    Against,
+    Comparison,
+    Evidence,
+    Experiment,
 )
-from mjchair.diagnosis.replay.derivatives import Column
+from mjchair.diagnosis.next_experiment.manoeuvres import Manoeuvre, possible, setting
+from mjchair.diagnosis.next_experiment.rehearsal import Rehearsal, version
 from mjchair.diagnosis.replay.pulses import Force
-from mjchair.diagnosis.replay.sampling import residual
 from mjchair.effects.effect import Effect
 from mjchair.effects.library import library
 from mjchair.errors import MjchairError
 
-Array = NDArray[np.float64]
-SMOOTH = 0.5  # s, over which a person would average a channel
 # a force of any course that no effect makes
 OUTSIDE = {
     Force.FORWARD: "a force along the way from outside the library",
@@ -52,46 +44,13 @@ PLENTY, MARGIN = 100.0, 3.0
 
 
 @dataclass(frozen=True)
-class Experiment:
-    """A manoeuvre and what it tells apart.
-
-    Attributes:
-      manoeuvre: which. separations: T against each rival, chi2.
-    """
-
-    manoeuvre: Manoeuvre
-    separations: tuple[float, ...]
-
-    @property
-    def least(self) -> float:
-        """T against the rival that it tells apart worst."""
-        return min(self.separations)
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """Where a rival that did its best still differs most, over a whole manoeuvre.
-
-    Attributes:
-      channel: which. time: s from the start. chosen, rival: what it shows then, SI.
-      noises: their difference over the channel's noise.
-    """
-
-    channel: str
-    time: float
-    chosen: float
-    rival: float
-    noises: float
-
-
-@dataclass(frozen=True)
 class Plan:
     """Experiments, best first.
 
     Attributes:
       chosen: name of the hypothesis that was rehearsed. rivals: names of the others.
-      experiments: all. evidence: of the best, against each rival; None: a force has none.
-      torque: its largest, N m.
+      experiments: that were rehearsed. evidence: of the best, against each rival; None: a force
+        has none. torque: its largest, N m.
       dropped: a line for each rival or doubt that this chair cannot have.
       run: of the study, from whose place and heading the manoeuvres start.
       needed: T against each rival that decides, chi2.
@@ -123,7 +82,8 @@ def plan(
     """Rehearse the manoeuvres and rank them by the smallest T over the rivals.
 
     Of those that separate by PLENTY, and by MARGIN times what is needed, the one that stands first
-    is taken, as the simplest.
+    is taken, as the simplest. Those with torque, and then those with a load, are rehearsed only
+    where none before them separates so much.
 
     Args:
       bench: of the study. chosen: the chair that is rehearsed.
@@ -138,47 +98,32 @@ def plan(
     """
     here = setting(bench.simulator.study)
     made = manoeuvres or telling(possible(here), [chosen.variant, *(r.variant for r in rivals)])
-    rehearsal = Rehearsal(bench, here, made, version(chosen))
-    doubted = Doubts(bench, rehearsal, chosen, _doubted(chosen, rivals, doubts))
-    answers = {**nuisance_answers(rehearsal, chosen), **doubted.answers}
-    kept: list[_Against] = []
-    dropped = list(doubted.dropped)
-    for rival, enough in zip(rivals, needed or [ENOUGH] * len(rivals), strict=True):
-        ours, theirs = (
-            distinct(chosen.variant, rival.variant),
-            distinct(rival.variant, chosen.variant),
-        )
-        try:
-            far = separation(rehearsal, bench, rival, answers, doubted.columns)
-        except (MjchairError, np.linalg.LinAlgError) as error:
-            dropped.append(f"{theirs} was not rehearsed: {error}")
-            continue
-        kept.append(_Against(ours, theirs, enough, far, rival))
-    if not rivals:
-        kept = _forces(bench, rehearsal, chosen, answers, doubted)
+    held = _held(chosen, rivals, needed) if rivals else _forces(chosen)
+    doubted = _doubted(chosen, rivals, doubts)
+    parts: list[Comparison] = []
+    for some in _simple_first(made):
+        parts.append(Comparison(bench, Rehearsal(bench, here, some, version(chosen)), chosen))
+        parts[-1].compare(held, doubted)
+        if _has_plenty(parts):
+            break
+    parts = [part for part in parts if part.rehearsal.possible] or parts[:1]
+    dropped = tuple(dict.fromkeys(line for part in parts for line in part.dropped))
+    kept = _in_all(parts)
     if not kept:
         raise MjchairError("no experiment can be planned: " + "; ".join(dropped))
-    experiments = [
-        Experiment(m, tuple(float(k.far.least[i]) for k in kept))
-        for i, m in enumerate(rehearsal.manoeuvres)
-    ]
     needs = [k.needed for k in kept]
-    order = sorted(range(len(experiments)), key=lambda i: (-_share(experiments[i], needs), i))
-    best = order[0]
-    rehearsed = version(chosen)
-    evidence = [
-        None
-        if k.rival is None
-        else _evidence(rehearsal, bench, best, rehearsed, version(k.rival, k.far.steps[best]))
-        for k in kept
-    ]
+    ranked = sorted(
+        ((part, i, part.experiment(i, kept)) for part in parts for i in part.places),
+        key=lambda entry: -_share(entry[2], needs),
+    )
+    part, best, _ = ranked[0]
     return Plan(
         chosen=tuple(k.chosen for k in kept),
         rivals=tuple(k.name for k in kept),
-        experiments=tuple(experiments[i] for i in order),
-        evidence=tuple(evidence),
-        torque=here.largest(rehearsal.manoeuvres[best]),
-        dropped=tuple(dropped),
+        experiments=tuple(experiment for *_, experiment in ranked),
+        evidence=tuple(part.evidence(best, k) for k in kept),
+        torque=here.largest(part.rehearsal.manoeuvres[best]),
+        dropped=dropped,
         run=here.run,
         needed=tuple(needs),
     )
@@ -194,44 +139,51 @@ def telling(manoeuvres: Sequence[Manoeuvre], chairs: Sequence[Variant]) -> list[
     return [m for m in manoeuvres if sensors or not m.stands]
 
 
-@dataclass(frozen=True)
-class _Against:
-    """A rival in every manoeuvre.
-
-    Attributes:
-      chosen, name: of what is chosen and of the rival. needed: T that rules it out, chi2.
-      far: how far it stays behind. rival: its fit; None: a force of any course.
-    """
-
-    chosen: str
-    name: str
-    needed: float
-    far: Separated
-    rival: Fitted | None
-
-
-def _forces(
-    bench: Bench,
-    rehearsal: Rehearsal,
-    chosen: Fitted,
-    answers: dict[ColumnId, Column],
-    doubted: Doubts,
-) -> list[_Against]:
-    """The chosen effects against a force that no effect makes, in their place."""
-    nothing = replace(chosen.variant, terms=())
-    name = distinct(chosen.variant, nothing)
-    out = []
-    for force, words in OUTSIDE.items():
-        further, columns = outside_answers(rehearsal, chosen, force)
-        far = separation(
-            rehearsal,
-            bench,
-            replace(chosen, variant=nothing),
-            {**answers, **further},
-            {**doubted.columns, **columns},
+def _held(
+    chosen: Fitted, rivals: Sequence[Fitted], needed: Sequence[float] | None
+) -> list[Against]:
+    """The chosen effects against each rival."""
+    return [
+        Against(
+            distinct(chosen.variant, rival.variant),
+            distinct(rival.variant, chosen.variant),
+            enough,
+            rival,
         )
-        out.append(_Against(name, words, ENOUGH, far, None))
-    return out
+        for rival, enough in zip(rivals, needed or [ENOUGH] * len(rivals), strict=True)
+    ]
+
+
+def _forces(chosen: Fitted) -> list[Against]:
+    """The chosen effects against a force that no effect makes, in their place."""
+    nothing = replace(chosen, variant=replace(chosen.variant, terms=()))
+    name = distinct(chosen.variant, nothing.variant)
+    return [Against(name, words, ENOUGH, nothing, force) for force, words in OUTSIDE.items()]
+
+
+def _simple_first(manoeuvres: Sequence[Manoeuvre]) -> list[list[Manoeuvre]]:
+    """The manoeuvres in the order of trying: without torque and load, with torque, with a load."""
+
+    def rank(m: Manoeuvre) -> int:
+        return 2 if m.load is not None else int(m.torque is not None)
+
+    return [list(some) for _, some in groupby(sorted(manoeuvres, key=rank), key=rank)]
+
+
+def _in_all(parts: Sequence[Comparison]) -> list[Against]:
+    """The rivals that could be rehearsed in every part."""
+    return [k for k in parts[0].apart if all(k in part.apart for part in parts)]
+
+
+def _has_plenty(parts: Sequence[Comparison]) -> bool:
+    """Whether a manoeuvre has plenty against every rival: no further one comes before it."""
+    held = _in_all(parts)
+    needs = [k.needed for k in held]
+    return bool(held) and any(
+        part.rehearsal.possible and _share(part.experiment(i, held), needs) >= 1.0
+        for part in parts
+        for i in part.places
+    )
 
 
 def _share(experiment: Experiment, needed: Sequence[float]) -> float:
@@ -254,24 +206,3 @@ def distinct(variant: Variant, other: Variant) -> str:
     theirs = {t.effect.key for t in other.terms}
     mine = [t.effect.key for t in variant.terms if t.effect.key not in theirs]
     return " and ".join(mine) or "no further effect"
-
-
-def _evidence(
-    rehearsal: Rehearsal, bench: Bench, which: int, chosen: Version, rival: Version
-) -> Evidence:
-    channels = rehearsal.simulator.channels
-    ours, theirs = (rehearsal.whole(v, which) for v in (chosen, rival))
-    time = rehearsal.simulator.study.runs[which].trial.time
-    width = max(1, min(round(SMOOTH / float(time[1] - time[0])), time.size))
-    mean = np.ones(width) / width
-    noise = np.array([bench.noise[c].total for c in channels])
-    apart = residual(theirs, ours, channels) * rehearsal.used(which)[:, None]
-    apart, ours = (
-        np.column_stack([np.convolve(v, mean, mode="valid") for v in values.T])
-        for values in (apart, ours)
-    )
-    apart[:, [c in bench.simulator.study.copied for c in channels]] = 0.0  # nobody can look at it
-    row, k = np.unravel_index(np.argmax(np.abs(apart) / noise), apart.shape)
-    when = float(time[row : row + width].mean())
-    value, by = float(ours[row, k]), float(apart[row, k])
-    return Evidence(channels[k], when, value, value + by, abs(by) / float(noise[k]))

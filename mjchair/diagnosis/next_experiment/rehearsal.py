@@ -93,7 +93,8 @@ class Rehearsal:
     """Manoeuvres as one chair would make them, cut into windows.
 
     Attributes:
-      manoeuvres: that the chair comes through and would repeat. first: their states at the start.
+      manoeuvres: that the chair comes through and would repeat; the first of all if it is none.
+      possible: whether there is one. first: their states at the start.
       simulator: of their windows. whitener: of the noise that the study has.
       chair: that makes them. track: of it, from its own states.
       process: what shakes the chair, as strong as in the study; None: nothing.
@@ -111,7 +112,9 @@ class Rehearsal:
         self.first = self._starts(chair)
         made = self._open_loop(chair, self.first)
         traces, again = [o.trace for o in made], self._nudged(chair)
-        whole = [i for i in range(len(traces)) if self._possible(traces[i], again[i])] or [0]
+        whole = [i for i in range(len(traces)) if self._possible(traces[i], again[i])]
+        self.possible = bool(whole)
+        whole = whole or [0]
         if len(whole) < len(traces):
             self.manoeuvres = [self.manoeuvres[i] for i in whole]
             self.first = [self.first[i] for i in whole]

@@ -10,7 +10,8 @@ from collections.abc import Collection, Sequence
 
 from mjchair.diagnosis.data.roughly_known import Nuisance
 from mjchair.diagnosis.explain.column_ids import Driver, Quantity
-from mjchair.diagnosis.next_experiment.design import ENOUGH, PLENTY, Evidence, Plan
+from mjchair.diagnosis.next_experiment.comparison import Evidence
+from mjchair.diagnosis.next_experiment.design import ENOUGH, PLENTY, Plan
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.model.wheels import base_name
 from mjchair.simulation.channels import channels
