@@ -1368,6 +1368,7 @@ def test_ends_are_alike_within_a_tenth_of_a_standard_error():
     [
         (True, 1040.0, False, True),
         (True, 1040.0, True, False),  # no better
+        (True, 1020.0, True, True),  # it is better, and a further effect may follow
         (True, 1060.0, False, False),  # its parameters bring too little
         (False, 900.0, False, False),  # the first is enough
     ],
@@ -1402,8 +1403,47 @@ def test_another_form_of_an_effect_stands_in_where_the_first_leaves_a_gap(
     here = Tried(priced[id(wave)], fit(1080.0, "motion")), SimpleNamespace(exists=first_leaves)
     best, gap = alternatives.or_other_form(fits, here)
     assert best.hypothesis.starts == ((whole,) if taken else (wave,))
-    assert gap.exists == (first_leaves and not taken)
+    assert gap.exists == gaps[best.fitted.total]
     assert asked == ([(whole,)] if first_leaves else [])
+
+
+@pytest.mark.parametrize(
+    ("several", "total", "promised", "fitted", "taken"),
+    [
+        (True, 1030.0, 880.0, True, True),
+        (True, 1045.0, 880.0, True, False),  # its parameters bring too little
+        (True, 1030.0, 700.0, False, False),  # linear algebra has it far behind
+        (False, 1030.0, 880.0, False, False),  # of a single effect this was asked before
+    ],
+)
+def test_a_wrong_form_of_one_of_several_effects_gives_way(several, total, promised, fitted, taken):
+    """One caster that sticks, with a late angle of the other, was named for two that stick."""
+    one, both = (
+        SimpleNamespace(
+            effect=SimpleNamespace(key="caster_friction", common=1.0, fitted=()),
+            free=(name,),
+            columns=(name,),
+        )
+        for name in ("right", "moment")
+    )
+    chosen = (one, WIND) if several else (one,)
+    priced = {id(one): hypotheses.priced(chosen, gain=900.0)}
+    priced[id(both)] = hypotheses.priced([both if s is one else s for s in chosen], gain=promised)
+    asked = []
+
+    def made(hypothesis, _best):
+        asked.append(hypothesis.starts)
+        return Tried(hypothesis, fit(total, "caster_friction", "wind"))
+
+    fits = SimpleNamespace(
+        base=SimpleNamespace(starts=[WIND, one, both]),
+        weigh=lambda starts: priced[id(starts[0])],
+        is_physical=lambda _: True,
+        fit=made,
+    )
+    best = Tried(priced[id(one)], fit(1040.0, "caster_friction", "wind"))
+    assert alternatives.or_other_forms(fits, best).hypothesis.starts[0] is (both if taken else one)
+    assert asked == ([(both, WIND)] if fitted else [])
 
 
 @pytest.mark.parametrize(

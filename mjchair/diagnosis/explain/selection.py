@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from mjchair.diagnosis import rules
-from mjchair.diagnosis.explain import one_run, search_rules
+from mjchair.diagnosis.explain import alternatives, one_run, search_rules
 from mjchair.diagnosis.explain.backward_elimination import without_needless
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Choice, Tried
@@ -70,7 +70,8 @@ def choose(fits: Fits) -> Choice | None:
     here = grown(fits)
     if here is None:
         return None
-    best, rivals = against_rivals(fits, without_needless(fits, here[0]))
+    formed = alternatives.or_other_forms(fits, here[0])
+    best, rivals = against_rivals(fits, without_needless(fits, formed))
     better = better_than(fits, _choice(fits, best, fits.anew(best), rivals))
     if better is not None:
         best, rivals = against_rivals(fits, without_needless(fits, better))
