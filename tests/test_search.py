@@ -1442,7 +1442,8 @@ def test_a_wrong_form_of_one_of_several_effects_gives_way(several, total, promis
         fit=made,
     )
     best = Tried(priced[id(one)], fit(1040.0, "caster_friction", "wind"))
-    assert alternatives.or_other_forms(fits, best).hypothesis.starts[0] is (both if taken else one)
+    formed = alternatives.or_other_form_beside(fits, best)
+    assert formed.hypothesis.starts[0] is (both if taken else one)
     assert asked == ([(both, WIND)] if fitted else [])
 
 

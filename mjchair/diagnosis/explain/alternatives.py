@@ -95,7 +95,7 @@ def or_other_form(fits: Fits, here: WithGap) -> WithGap:
     return here
 
 
-def or_other_forms(fits: Fits, best: Tried) -> Tried:
+def or_other_form_beside(fits: Fits, best: Tried) -> Tried:
     """Several effects, or the same with one of them in another form that is better.
 
     A further effect may have made up for a wrong form: one caster that sticks, with the late angle

@@ -70,7 +70,7 @@ def choose(fits: Fits) -> Choice | None:
     here = grown(fits)
     if here is None:
         return None
-    formed = alternatives.or_other_forms(fits, here[0])
+    formed = alternatives.or_other_form_beside(fits, here[0])
     best, rivals = against_rivals(fits, without_needless(fits, formed))
     better = better_than(fits, _choice(fits, best, fits.anew(best), rivals))
     if better is not None:
