@@ -246,10 +246,11 @@ def _best_delay(around: Around, effect: Effect, p: Parameter) -> float:
     bench = around.bench
     system = bench.system(around.track, columns, 0, around.variant, only=bench.windows)
     reduced = bounded.reduce(system, bench.windows)
-    if not np.diag(reduced.G).all():
-        return p.change
-    asked, gains = reduced.b / np.diag(reduced.G), reduced.b**2 / np.diag(reduced.G)
-    gains[1:][np.abs(asked[1:] - 1.0) > ITSELF] = 0.0
+    asked = [float(reduced.solve([k])[0]) for k in range(len(sizes))]
+    gains = [
+        reduced.gain([k]) if k == 0 or abs(share - 1.0) <= ITSELF else 0.0
+        for k, share in enumerate(asked)
+    ]
     best = int(np.argmax(gains))
     return sizes[best] if gains[best] - gains[0] > search_rules.WORTH else p.change
 

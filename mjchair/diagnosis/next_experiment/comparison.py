@@ -24,7 +24,6 @@ from mjchair.diagnosis.next_experiment.separation import (
 )
 from mjchair.diagnosis.replay.pulses import Force
 from mjchair.diagnosis.replay.sampling import residual
-from mjchair.effects.effect import Effect
 from mjchair.errors import MjchairError
 
 SMOOTH = 0.5  # s, over which a person would average a channel
@@ -85,27 +84,29 @@ class Comparison:
 
     Attributes:
       rehearsal: of the chosen chair. apart: the rivals that could be rehearsed.
-      dropped: a line for each rival or doubt that this chair cannot have.
+      dropped: a line for each rival that this chair cannot have.
     """
 
-    def __init__(self, bench: Bench, rehearsal: Rehearsal, chosen: Fitted) -> None:
-        """Nothing is compared yet."""
-        self.bench, self.rehearsal, self.chosen = bench, rehearsal, chosen
+    def __init__(
+        self, bench: Bench, rehearsal: Rehearsal, held: Sequence[Against], doubts: Doubts
+    ) -> None:
+        """Compare each rival, where effects that were doubted may be there besides."""
+        self.bench, self.rehearsal, self.chosen = bench, rehearsal, doubts.chosen
         self.apart: dict[Against, Separated] = {}
         self.dropped: list[str] = []
+        self._compare(held, doubts)
 
     @property
     def places(self) -> range:
         """Of its manoeuvres."""
         return range(len(self.rehearsal.manoeuvres))
 
-    def compare(self, held: Sequence[Against], doubted: Sequence[Effect]) -> None:
-        """How far each rival stays behind, where effects that were doubted may be there besides."""
-        doubts = Doubts(self.bench, self.rehearsal, self.chosen, doubted)
-        self.dropped += doubts.dropped
-        answers = {**nuisance_answers(self.rehearsal, self.chosen), **doubts.answers}
+    def _compare(self, held: Sequence[Against], doubts: Doubts) -> None:
+        doubted = doubts.answers(self.rehearsal)
+        known = {key: doubts.columns[key] for key in doubted}
+        answers = {**nuisance_answers(self.rehearsal, self.chosen), **doubted}
         for against in held:
-            answering, columns = answers, doubts.columns
+            answering, columns = answers, known
             if against.force is not None:
                 more, nothing = outside_answers(self.rehearsal, self.chosen, against.force)
                 answering, columns = {**answers, **more}, {**columns, **nothing}

@@ -27,6 +27,7 @@ from mjchair.diagnosis.next_experiment.comparison import (
 )
 from mjchair.diagnosis.next_experiment.manoeuvres import Manoeuvre, possible, setting
 from mjchair.diagnosis.next_experiment.rehearsal import Rehearsal, version
+from mjchair.diagnosis.next_experiment.separation import Doubts
 from mjchair.diagnosis.replay.pulses import Force
 from mjchair.effects.effect import Effect
 from mjchair.effects.library import library
@@ -99,15 +100,16 @@ def plan(
     here = setting(bench.simulator.study)
     made = manoeuvres or telling(possible(here), [chosen.variant, *(r.variant for r in rivals)])
     held = _held(chosen, rivals, needed) if rivals else _forces(chosen)
-    doubted = _doubted(chosen, rivals, doubts)
+    doubted = Doubts(bench, chosen, _doubted(chosen, rivals, doubts))
     parts: list[Comparison] = []
     for some in _simple_first(made):
-        parts.append(Comparison(bench, Rehearsal(bench, here, some, version(chosen)), chosen))
-        parts[-1].compare(held, doubted)
+        rehearsal = Rehearsal(bench, here, some, version(chosen))
+        parts.append(Comparison(bench, rehearsal, held, doubted))
         if _has_plenty(parts):
             break
-    parts = [part for part in parts if part.rehearsal.possible] or parts[:1]
-    dropped = tuple(dict.fromkeys(line for part in parts for line in part.dropped))
+    parts = [part for part in parts if part.rehearsal.any_possible] or parts[:1]
+    lines = [*doubted.dropped, *(line for part in parts for line in part.dropped)]
+    dropped = tuple(dict.fromkeys(lines))
     kept = _in_all(parts)
     if not kept:
         raise MjchairError("no experiment can be planned: " + "; ".join(dropped))
@@ -180,7 +182,7 @@ def _has_plenty(parts: Sequence[Comparison]) -> bool:
     held = _in_all(parts)
     needs = [k.needed for k in held]
     return bool(held) and any(
-        part.rehearsal.possible and _share(part.experiment(i, held), needs) >= 1.0
+        part.rehearsal.any_possible and _share(part.experiment(i, held), needs) >= 1.0
         for part in parts
         for i in part.places
     )

@@ -94,7 +94,7 @@ class Rehearsal:
 
     Attributes:
       manoeuvres: that the chair comes through and would repeat; the first of all if it is none.
-      possible: whether there is one. first: their states at the start.
+      any_possible: whether there is one. first: their states at the start.
       simulator: of their windows. whitener: of the noise that the study has.
       chair: that makes them. track: of it, from its own states.
       process: what shakes the chair, as strong as in the study; None: nothing.
@@ -113,7 +113,7 @@ class Rehearsal:
         made = self._open_loop(chair, self.first)
         traces, again = [o.trace for o in made], self._nudged(chair)
         whole = [i for i in range(len(traces)) if self._possible(traces[i], again[i])]
-        self.possible = bool(whole)
+        self.any_possible = bool(whole)
         whole = whole or [0]
         if len(whole) < len(traces):
             self.manoeuvres = [self.manoeuvres[i] for i in whole]

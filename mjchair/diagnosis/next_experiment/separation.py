@@ -179,29 +179,38 @@ def nuisance_answers(rehearsal: Rehearsal, chosen: Fitted) -> dict[ColumnId, Col
 
 
 class Doubts:
-    """Columns of doubted effects in the manoeuvres and in the present data.
+    """Columns of doubted effects in the present data, which are the same for all manoeuvres.
 
     Attributes:
-      answers: of the manoeuvres. columns: of the present data. dropped: a line for each effect
-        that this chair cannot have.
+      columns: of the present data. dropped: a line for each effect that this chair cannot have.
     """
 
-    def __init__(
-        self, bench: Bench, rehearsal: Rehearsal, chosen: Fitted, effects: Sequence[Effect]
-    ) -> None:
+    def __init__(self, bench: Bench, chosen: Fitted, effects: Sequence[Effect]) -> None:
         """Simulate each of them."""
-        self.answers: dict[ColumnId, Column] = {}
+        self.chosen = chosen
+        self.effects: dict[ColumnId, Effect] = {}
         self.columns: dict[ColumnId, Column] = {}
         self.dropped: list[str] = []
         for effect in effects:
             key = RoughlyKnown(effect.key)
             try:
-                answer = doubt_answer(rehearsal, chosen, effect)
-                column = doubt_column(bench, chosen, effect)
+                self.columns[key] = doubt_column(bench, chosen, effect)
+                self.effects[key] = effect
             except MjchairError as error:
-                self.dropped.append(f"{effect.key} was not doubted along: {error}")
-                continue
-            self.answers[key], self.columns[key] = answer, column
+                self._drop(effect, error)
+
+    def answers(self, rehearsal: Rehearsal) -> dict[ColumnId, Column]:
+        """Their columns in the manoeuvres, of those that the chair can have there."""
+        out: dict[ColumnId, Column] = {}
+        for key, effect in self.effects.items():
+            try:
+                out[key] = doubt_answer(rehearsal, self.chosen, effect)
+            except MjchairError as error:
+                self._drop(effect, error)
+        return out
+
+    def _drop(self, effect: Effect, error: MjchairError) -> None:
+        self.dropped.append(f"{effect.key} was not doubted along: {error}")
 
 
 def doubt_answer(rehearsal: Rehearsal, chosen: Fitted, effect: Effect) -> Column:
