@@ -160,6 +160,18 @@ def test_nothing_separates_a_chair_from_itself(one_way):
     assert max(e.least for e in found.experiments) < 1e-3
 
 
+def test_where_a_fit_ends_early_promises_nothing(one_way):
+    """What a fit still promises itself was laid on a doubt beside it: 120 of chi2 for 0.6."""
+    _, _, bench, (rolling, _, _) = one_way
+    ((key, parameter),) = rolling.variant.terms[0].parameters
+    aside = np.zeros_like(rolling.step)
+    aside[rolling.system.places[key]] = 0.1 * rolling.std[key] / parameter.change
+    early = replace(rolling, step=rolling.step + aside)
+    few = [BY_NAME["coast reversed"], BY_NAME["loaded coast"]]
+    found = design.plan(bench, rolling, [early], few, doubts=[find("bearing_friction")])
+    assert max(e.least for e in found.experiments) < 0.1
+
+
 def _too_thin(spec, size):
     """Make an inertia that no body has, where size is not 0."""
     if size:
