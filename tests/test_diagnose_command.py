@@ -15,8 +15,11 @@ import pytest
 
 import mjchair
 from mjchair import cli
+from mjchair.commands import diagnose
 from mjchair.commands.diagnose import CANDIDATE, GAP
 from mjchair.diagnosis.replay.cache import Store
+from mjchair.diagnosis.result import Diagnosis, GapSummary, NamedEffect
+from mjchair.diagnosis.rules import Verdict
 from mjchair.effects.library import find
 from mjchair.storage import only_writer
 
@@ -64,6 +67,21 @@ def test_writes_what_it_says(done):
     assert "unfinished" not in names and not [n for n in names if n.startswith(".")]
     for name in (n for n in names if n.endswith(".png")):
         assert (out / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_first_line_tells_effects_together_from_rivals():
+    def line(verdict, *alternatives):
+        names = ("floor_slope", "payload")
+        effects = [NamedEffect(name=name, parameters={}, closure=1.0) for name in names]
+        gap = GapSummary(before=3.0, after=1.0, scope="", p_value=0.0, p_value_after=1.0)
+        found = Diagnosis(verdict=verdict, effects=effects, alternatives=alternatives, gap=gap)
+        return diagnose._line(found).split(";")[0]
+
+    assert line(Verdict.NAMED) == "named: floor_slope, payload"
+    two = line(Verdict.AMBIGUOUS, ["payload", "torque_gain", "none"], ["floor_slope", "toe"])
+    assert two == "ambiguous: floor_slope (or toe), payload (or torque_gain or none)"
+    both = line(Verdict.AMBIGUOUS, ["floor_slope+payload", "wind"])
+    assert both == "ambiguous: floor_slope, payload, or wind for floor_slope+payload"
 
 
 def test_json_has_the_keys_of_its_contract(done):

@@ -170,9 +170,15 @@ def _interrupted(kept: Path) -> bool:
 
 
 def _line(found: Diagnosis) -> str:
-    """Verdict, effects and gap on one line."""
-    names = ", ".join(e.name for e in found.effects) or "no effect"
+    """Verdict, effects with what could stand in their places, and gap, on one line."""
+    from mjchair.report.diagnosis_words.explanations import in_place_of
+
+    rivals = {own: " or ".join(others) for own, others in in_place_of(found.alternatives).items()}
+    alone = {own: f" (or {others})" for own, others in rivals.items()}
+    together = [f", or {others} for {own}" for own, others in rivals.items() if "+" in own]
+    names = ", ".join(e.key + alone.get(e.key, "") for e in found.effects) or "no effect"
     gap = found.gap
     assert gap is not None
     after = "" if gap.after is None else f" -> {gap.after:.2f}"
+    names += "".join(together)
     return f"{found.verdict}: {names}; gap {gap.before:.2f}{after} (noise {gap.noise_floor:.2f})"
