@@ -349,6 +349,10 @@ class LinearFits(Fits):
         """The linear fit: from any start it ends in the same place."""
         return _fit(self.base, hypothesis)
 
+    def screen_anew(self, fitted: Any) -> bool:
+        """Columns are the same around every fit."""
+        return False
+
     def near_to(self, tried: Any) -> Any:
         """Nothing else to weigh by: a linear system is the same around any chair."""
         return contextlib.nullcontext()
@@ -455,6 +459,7 @@ def base_of(bed: Bed, y: Sequence[Array]) -> Any:
         starts=bed.kept.starts,
         found=None,
         best=None,
+        anew={},
     )
 
 

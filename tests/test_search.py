@@ -20,6 +20,7 @@ from mjchair.diagnosis.explain import (
     alternatives,
     backward_elimination,
     choice,
+    columns_anew,
     event,
     forward_selection,
     hypotheses,
@@ -109,6 +110,7 @@ def fits(monkeypatch):
 
     monkeypatch.setattr(search_rules, "NOTHING", 0.0)  # no effect is so small that columns hold
     monkeypatch.setattr(forward_selection, "_happened_once", lambda *_: False)
+    monkeypatch.setattr(columns_anew, "make", lambda *_: False)
     monkeypatch.setattr(probable, "probabilities", lambda *_: {})
     monkeypatch.setattr(whole_sizes, "fits", lambda *_: ())
     monkeypatch.setattr(whole_beside, "fits", lambda *_: ())
@@ -148,6 +150,7 @@ def searching():
         around=SimpleNamespace(track="as given", variant=Variant(())),
         found=None,
         best=None,
+        anew={},
     )
     return Fits(base, lambda line: None)
 
@@ -965,6 +968,7 @@ def test_beside_what_happened_once_no_second_effect_is_sought(
     monkeypatch.setattr(forward_selection, "is_worth", lambda *_: True)
     monkeypatch.setattr(forward_selection, "_settled", lambda _, here: here)
     monkeypatch.setattr(forward_selection, "_or_left_over", lambda _, here: here)
+    monkeypatch.setattr(columns_anew, "make", lambda *_: False)
     for name in ("or_as_given", "or_by_most_windows", "or_other_form", "or_whole"):
         monkeypatch.setattr(alternatives, name, lambda _, here: here)
     one = Tried(ONE, fit(1500.0, "rolling")), gap
@@ -1127,6 +1131,49 @@ def test_where_no_second_effect_stands_no_third_is_tried(fits, monkeypatch):
     chosen = selection.choose(Fits(base, lambda line: None))
     assert chosen.hypothesis is ONE
     assert "motor+rolling+scrub" not in {keys for keys, _ in fits.asked}
+
+
+@pytest.mark.parametrize(
+    ("otherwise", "offset", "total", "both"),
+    [
+        (True, 0.0, 1010.0, True),  # the chair answers otherwise than the one given
+        (False, 3.0, 1010.0, True),  # a number stands on its wall
+        (False, 2.9, 1010.0, False),
+        (True, 3.0, 1100.0, False),  # the further effect is not worth it
+    ],
+)
+def test_beside_effects_that_leave_no_gap_one_may_hide(
+    fits, monkeypatch, otherwise, offset, total, both
+):
+    first = fit(1110.0, "rolling")
+    first.variant = replace(first.variant, offsets={"mass": offset})
+    fits.answers[("rolling", "as given")] = fits.answers[("rolling", "track of rolling")] = first
+    fits.answers[("motor+rolling", "as given")] = fit(total, "rolling", "motor")
+
+    def make(base, fitted, _):
+        keys = frozenset(t.effect.key for t in fitted.variant.terms)
+        return otherwise and base.anew.setdefault(keys, {}) is not None
+
+    monkeypatch.setattr(columns_anew, "make", make)
+    monkeypatch.setattr(hypotheses, "singles", lambda *_: [ONE])
+    gap = SimpleNamespace(exists=False)
+    monkeypatch.setattr(fits_of_hypotheses, "gap_after", lambda *_: gap)
+    monkeypatch.setattr(fits_of_hypotheses, "near_fit", lambda *_: None)
+    monkeypatch.setattr(shortlist, "_commonest", lambda _, options: options[0])
+    monkeypatch.setattr(forward_selection, "promising", lambda *_: [])
+    monkeypatch.setattr(
+        forward_selection, "everywhere", lambda _, best: [BOTH] if best.hypothesis is ONE else []
+    )
+    monkeypatch.setattr(
+        forward_selection, "is_worth", lambda _, one, more: one.price - more.price > 50.0
+    )
+    monkeypatch.setattr(alternatives, "or_whole_beside", lambda _, here: here)
+    monkeypatch.setattr(Fits, "anew", lambda _, tried: tried.fitted)
+    believe(monkeypatch, lambda _: True)
+    looking = searching()
+    looking.base.starts = ()
+    best, _ = forward_selection.grown(looking)
+    assert best.hypothesis is (BOTH if both else ONE)
 
 
 @pytest.mark.parametrize("total", [1005.0, 1490.0])

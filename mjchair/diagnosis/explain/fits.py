@@ -13,7 +13,14 @@ from contextlib import contextmanager
 from dataclasses import replace
 from operator import attrgetter
 
-from mjchair.diagnosis.explain import hypotheses, open_ended, profile, search_rules, whole_sizes
+from mjchair.diagnosis.explain import (
+    columns_anew,
+    hypotheses,
+    open_ended,
+    profile,
+    search_rules,
+    whole_sizes,
+)
 from mjchair.diagnosis.explain.candidates import Start
 from mjchair.diagnosis.explain.choice import Tried, is_there
 from mjchair.diagnosis.explain.gap import Gap
@@ -211,6 +218,14 @@ class Fits:
         fitted = whole_sizes.compared(self.base, self._remade(tried))
         fitted = profile.followed(self.base, fitted)
         return with_form_errors(open_ended.with_least_sizes(self.base, fitted))
+
+    def screen_anew(self, fitted: Fitted) -> bool:
+        """Weigh by columns around a fit, if its chair answers otherwise; False: it does not."""
+        if not columns_anew.make(self.base, fitted, self.say):
+            return False
+        self.gaps = [known for known in self.gaps if known[0] is not fitted]
+        self.latest = None
+        return True
 
     def gap_after(self, fitted: Fitted) -> Gap:
         """The gap that a fit leaves, sought once."""

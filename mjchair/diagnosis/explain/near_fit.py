@@ -112,7 +112,7 @@ class NearFit:
 
 def near_fit(base: Base, found: Found) -> NearFit:
     """The linear algebra around a fit."""
-    columns = {**found.fitted.columns, **base.columns}
+    columns = {**found.fitted.columns, **base.columns_around(found.fitted)}
     system = base.bench.system(
         found.fitted.track, columns, len(base.nuisances), found.fitted.variant
     )

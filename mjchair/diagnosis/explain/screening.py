@@ -77,6 +77,7 @@ class Base:
       found: effects without which they passed for noise; None: noise hides none.
       best: the hypothesis of any size that is best by linear algebra, fitted while the noise was
         sought; None: none brings enough, or this chair cannot have it.
+      anew: keys of effects -> the columns of others around their fit (columns_anew.py).
       looked: what was seen at whole sizes (whole_sizes.py), which are looked at twice.
     """
 
@@ -91,6 +92,7 @@ class Base:
     reduced: Reduced
     found: Found | None = None
     best: Found | None = None
+    anew: dict[frozenset[str], dict[ColumnId, Column]] = field(default_factory=dict)
     looked: dict[Hashable, Any] = field(default_factory=dict, init=False)
 
     @cached_property
@@ -102,6 +104,12 @@ class Base:
         """
         lasting = [s for s in self.starts if s.effect.sensor is not SensorError.SCALE]
         return best_run(self.system, self.bench.windows, lasting)
+
+    def columns_around(self, fitted: Fitted) -> dict[ColumnId, Column]:
+        """The columns of effects and forces, as near to a fit as they were made."""
+        keys = {t.effect.key for t in fitted.variant.terms}
+        nearest = max((k for k in self.anew if k <= keys), key=len, default=frozenset())
+        return {**self.columns, **self.anew.get(nearest, {})}
 
 
 def silent(_: str) -> None:
@@ -405,7 +413,7 @@ def system_around(
     """
     before = first or {}
     count = len(before) + len(fitted.columns)
-    columns = {**before, **fitted.columns, **base.columns}
+    columns = {**before, **fitted.columns, **base.columns_around(fitted)}
     free = len(fitted.columns) - len(base.nuisances)
     return bench.system(fitted.track, columns, count, fitted.variant, free=free)
 
@@ -460,7 +468,7 @@ def tested(
         system = system_around(base, bench, fitted, first)
     else:
         nuisances = {**(first or {}), **nuisances_of(base, fitted)}
-        every = {**nuisances, **base.columns}
+        every = {**nuisances, **base.columns_around(fitted)}
         system = bench.system(fitted.track, every, len(nuisances), fitted.variant)
     made = any(p.whole for term in terms for _, p in term.parameters)
     return system, calm(bench.simulator.windows, bench.windows) if made else bench.windows.tolist()

@@ -70,6 +70,13 @@ def promising(fits: Fits, best: Tried) -> list[Hypothesis]:
     ]
 
 
+def everywhere(fits: Fits, best: Tried) -> list[Hypothesis]:
+    """Hypotheses of one effect more that every chair has a little of, the first form of each."""
+    starts = best.hypothesis.starts
+    first = {s.effect.key: s for s in reversed(fits.base.starts) if s.effect.everywhere}
+    return [fits.weigh((*starts, s)) for k, s in first.items() if k not in best.hypothesis.keys]
+
+
 def best_of(
     fits: Fits,
     options: Sequence[Hypothesis],
