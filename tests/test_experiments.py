@@ -11,7 +11,7 @@ import pytest
 from noisy_run import NOISE, noisy_run
 
 import mjchair
-from mjchair.diagnosis import diagnose
+from mjchair.diagnosis import decide, diagnose
 from mjchair.diagnosis.data.roughly_known import MECHANICAL, Nuisance
 from mjchair.diagnosis.data.study import make_study
 from mjchair.diagnosis.explain.candidates import Around, collect
@@ -382,6 +382,15 @@ def test_a_run_in_which_somebody_may_have_pushed_is_left_out_first():
     assert "without coast" in wording.searching(drivers, {"coast"})
     assert "without coast" not in wording.searching(drivers, {"push"})
     assert "without coast" not in wording.searching(drivers[1:], {"coast"})
+
+
+def test_a_number_on_its_wall_is_to_be_measured_beside_the_next_run():
+    """Torques 15 % too small stood for a load of 20 kg, of which the next run told nothing."""
+    known = tuple(n for n in MECHANICAL if n.name in ("mass", "inertia"))
+    fitted = SimpleNamespace(variant=Variant(known, {"mass": 3.0, "inertia": -2.9}))
+    (said,) = decide._to_measure(fitted)
+    assert "mass" in said and "3.0 sigmas" in said and "2.9" not in said
+    assert decide._to_measure(SimpleNamespace(variant=Variant(known, {"mass": 2.9}))) == []
 
 
 def test_what_was_moved_far_is_to_be_measured():

@@ -421,6 +421,18 @@ def test_rivals_are_in_the_first_sentence():
     )
 
 
+def test_a_rival_beside_a_clear_favourite_is_said_not_to_be_ruled_out():
+    """ "These runs cannot tell which", of 98 and 1 %, contradicted itself."""
+    sets = [["rolling_resistance", "toe"]]
+    found = Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets)
+    found.probability = {"rolling_resistance": 0.98, "toe": 0.01}
+    assert first_screen.missing(found).startswith(
+        "It is probably **rolling resistance** (98 %), but these runs do not rule out **toe**. The"
+    )
+    found.probability = {"rolling_resistance": 0.8, "toe": 0.2}
+    assert "cannot tell which" in first_screen.missing(found)
+
+
 def test_a_correction_that_is_less_probable_than_a_rival_says_why():
     sets = [["rolling_resistance", "toe"]]
     found = Diagnosis(verdict=Verdict.AMBIGUOUS, effects=[ROLLING], alternatives=sets)

@@ -353,7 +353,7 @@ def _following(
         return wording.repeating(alone.trial)
     if said == Verdict.AMBIGUOUS and choice is not None:
         run = [wording.deciding(plan, base.bench.simulator)] if plan is not None else []
-        told = [*run, *by_hand.sentences(choice)]
+        told = [*run, *by_hand.sentences(choice), *_to_measure(choice.fitted)]
         if told:
             return " ".join(told)
     if said == Verdict.UNKNOWN and alone is not None:
@@ -370,6 +370,13 @@ def _following(
     known = [(n, by) for n, by in fitted.variant.known_roughly if rules.is_far(by)]
     known += [(n, by) for n, by in notes.far_gains(fitted) if rules.is_far(by)]
     return wording.measuring(known)
+
+
+def _to_measure(fitted: Fitted) -> list[str]:
+    """What to measure that a fit pushed to its wall, where more may be missing; empty: nothing."""
+    walls = set(bounded.at_walls(fitted.variant.offsets))
+    said = wording.measuring([(n, by) for n, by in fitted.variant.known_roughly if n.name in walls])
+    return [said] if said else []
 
 
 def _moment(base: Base, gap: Gap, choice: Choice | None) -> tuple[Moment | None, str]:

@@ -32,6 +32,7 @@ from mjchair.report.diagnosis_words.names import (
     one_of,
     share,
     size,
+    together,
 )
 from mjchair.units import per_cent, probable, with_unit
 
@@ -42,6 +43,7 @@ STAYS = 0.95  # of a gap on held-out runs: a correction that leaves more does no
 ALL = 0.995  # of a gap: more is not told as 100 %
 MUCH = 0.15  # share by which a fit moved what a person can measure, worth a word beside a name
 ALIKE = 3  # effects in one run alone that a sentence names
+CLEARLY = 0.9  # probability from which rivals are said not to be ruled out, and no more
 UNSURE = 0.005  # probabilities below this are not named
 
 
@@ -147,6 +149,10 @@ def _open(diagnosis: Diagnosis, effects: Sequence[NamedEffect]) -> str:
     if len(sets) > 1 or len(effects) > 1:
         return f"{chair} But these runs cannot tell {one_from_another(sets)}."
     ((own, others),) = sets.items()
+    likely = of_effects(diagnosis.probability, [e.key for e in effects])
+    if likely >= CLEARLY:
+        first = f"it is probably {together(own)} ({share(likely)})"
+        return f"{first}, but these runs do not rule out {one_of(*others)}. {capital(chair)}"
     any_of = one_of(own, *others)
     return f"it is {any_of}, and these runs cannot tell which. {capital(chair)}"
 
