@@ -350,7 +350,7 @@ class LinearFits(Fits):
         return _fit(self.base, hypothesis)
 
     def screen_anew(self, fitted: Any) -> bool:
-        """Columns are the same around every fit."""
+        """False: the columns are the same around every fit."""
         return False
 
     def near_to(self, tried: Any) -> Any:

@@ -1176,6 +1176,20 @@ def test_beside_effects_that_leave_no_gap_one_may_hide(
     assert best.hypothesis is (BOTH if both else ONE)
 
 
+@pytest.mark.parametrize(("score", "there"), [(480.0, True), (-np.inf, False)])
+def test_what_every_chair_has_is_tried_beside_where_the_runs_show_it(score, there):
+    """Whatever linear algebra promises of it, and by the first of its forms."""
+    first, other = effect("scrub"), effect("scrub")
+    for start, everywhere in ((ROLLING, False), (first, True), (other, True)):
+        start.effect.everywhere = everywhere
+    looking = SimpleNamespace(
+        base=SimpleNamespace(starts=[ROLLING, first, other]),
+        weigh=lambda starts: Hypothesis(tuple(starts), gain=500.0, score=score),
+    )
+    found = shortlist.everywhere(looking, Tried(ONE, fit(1110.0, "rolling")))
+    assert [h.starts for h in found] == ([(ROLLING, first)] if there else [])
+
+
 @pytest.mark.parametrize("total", [1005.0, 1490.0])
 def test_beyond_a_pair_that_ends_on_a_bound_one_more_is_tried(fits, monkeypatch, total):
     """A gain of the rims pushed the mass that moves to its bound; without a bound none is tried."""

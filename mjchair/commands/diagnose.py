@@ -177,8 +177,8 @@ def _line(found: Diagnosis) -> str:
     alone = {own: f" (or {others})" for own, others in rivals.items()}
     together = [f", or {others} for {own}" for own, others in rivals.items() if "+" in own]
     names = ", ".join(e.key + alone.get(e.key, "") for e in found.effects) or "no effect"
+    said = f"{found.verdict}: {names}{''.join(together)}"
     gap = found.gap
     assert gap is not None
     after = "" if gap.after is None else f" -> {gap.after:.2f}"
-    names += "".join(together)
-    return f"{found.verdict}: {names}; gap {gap.before:.2f}{after} (noise {gap.noise_floor:.2f})"
+    return f"{said}; gap {gap.before:.2f}{after} (noise {gap.noise_floor:.2f})"

@@ -1,7 +1,7 @@
 """Forward selection: from one effect to as many as the data ask for.
 
 In: fits. Out: the best hypothesis that was grown effect by effect, and the gap that it leaves. It
-grows as long as it leaves a gap and a further effect is worth it.
+grows as long as it leaves a gap, or may hide a further effect, and a further effect is worth it.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ HIDDEN = 3  # further effects that are fitted where no gap is left
 def grown(fits: Fits) -> WithGap | None:
     """The best hypothesis, grown effect by effect, and the gap that it leaves; None: there is none.
 
-    It grows as long as it leaves a gap and a further effect is worth it.
+    It grows as long as a further effect is worth it.
     """
     if not _promises(fits):
         return None
@@ -80,9 +80,9 @@ def _may_hide(fits: Fits, best: Tried) -> bool:
     answers otherwise than the one given, even columns around its fit tell only a part: a scrub
     promised 16 of chi2 beside a load, and brought 67.
     """
-    fitted = fits.anew(best)
-    around = frozenset(best.hypothesis.keys) in fits.base.anew
-    return around or bool(bounded.at_walls(fitted.variant.offsets))
+    if frozenset(best.hypothesis.keys) in fits.base.anew:
+        return True
+    return bool(bounded.at_walls(fits.anew(best).variant.offsets))
 
 
 def _hidden_beside(fits: Fits, best: Tried) -> WithGap | None:

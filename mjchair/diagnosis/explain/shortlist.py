@@ -71,10 +71,14 @@ def promising(fits: Fits, best: Tried) -> list[Hypothesis]:
 
 
 def everywhere(fits: Fits, best: Tried) -> list[Hypothesis]:
-    """Hypotheses of one effect more that every chair has a little of, the first form of each."""
+    """Hypotheses of one effect more that every chair has a little of, the first form of each.
+
+    What these runs do not show at all is left out.
+    """
     starts = best.hypothesis.starts
     first = {s.effect.key: s for s in reversed(fits.base.starts) if s.effect.everywhere}
-    return [fits.weigh((*starts, s)) for k, s in first.items() if k not in best.hypothesis.keys]
+    more = [fits.weigh((*starts, s)) for k, s in first.items() if k not in best.hypothesis.keys]
+    return [h for h in more if np.isfinite(h.score)]
 
 
 def best_of(
