@@ -55,6 +55,11 @@ def hole(values, first, last):
     return np.where((first < TIME) & (last > TIME), np.nan, values)
 
 
+def drive(gains):
+    """Torques (N m) that give a chair of 90 kg an acceleration (m/s^2) against a resistance."""
+    return {f"{side}_wheel": 0.15 * (90.0 * gains + 12.0) for side in SIDES}
+
+
 TORQUE = np.full(TIME.size, 4.0)
 DRIVEN = coast() | {"left_wheel": TORQUE, "right_wheel": TORQUE}
 # name -> what is written, and what the line says
@@ -134,6 +139,15 @@ CASES = {
     "a velocity in km/h beside wheels": (
         {"columns": coast() | {"velocity.x": 3.5 * 0.3 * coast()["left_wheel_speed"]}},
         r"velocity.x looks like km/h: it tells 3.\d+ times .* as in velocity.x \[km/h\]",
+    ),
+    "a velocity in km/h beside nothing but torques": (
+        {"columns": {"velocity.x": 3.6 * PUSH} | drive(PULL)},
+        r"a: its torques and speeds go with a mass of 2\d kg, and the study gives \d+ kg: are the "
+        r"speeds in km/h",
+    ),
+    "forces at the rim taken for torques": (
+        {"columns": {"velocity.x": PUSH} | drive(PULL / 0.27)},
+        r"go with a mass of 3\d\d kg, .* are the torques forces at the rim \(N\)",
     ),
     "the only channel in degrees": (
         {"columns": {"left_wheel_speed": coast()["left_wheel_speed"] * 57.3}},

@@ -95,7 +95,7 @@ def test_a_bend_in_si_with_the_right_signs_is_read(tmp_path):
             "turns left where the wheels turn right: the columns of the two wheels are swapped",
         ),
         ({"imu_gyro.z": lambda c: -c["imu_gyro.z"]}, "imu_gyro.z and heading turn opposite ways"),
-        ({"left_wheel_speed": lambda c: -3.3 + 0.0 * TIME}, "does one of them count down"),
+        ({"left_wheel_speed": lambda c: -3.3 + 0.001 * TIME}, "does one of them count down"),
         (
             {f"{s}_wheel_speed": lambda c, s=s: 0.3 * c[f"{s}_wheel_speed"] for s in SIDES},
             "left_wheel_speed looks like m/s.* divide it by the wheel's radius, 0.3",
@@ -220,10 +220,19 @@ def test_a_dead_channel_is_left_out_and_said(tmp_path):
     assert any("imu_gyro.z is exactly zero" in note for note in study.notes)
 
 
-def test_a_wheel_stuck_at_one_speed_is_said(tmp_path):
-    columns = wheels() | {"left_wheel_speed": np.full(TIME.size, 3.0)}
+@pytest.mark.parametrize("stuck", ["left_wheel_speed", "imu_gyro.z"])
+def test_a_sensor_stuck_at_one_value_is_left_out_and_said(stuck, tmp_path):
+    columns = wheels() | {stuck: np.full(TIME.size, 3.0 if "wheel" in stuck else 0.02)}
     study = mjchair.read_study(write(tmp_path, columns))
-    assert sum("left_wheel_speed is exactly 3 throughout" in note for note in study.notes) == 1
+    assert stuck not in study.channels
+    assert sum(f"{stuck} is exactly" in note for note in study.notes) == 1
+
+
+def test_a_wheel_of_one_speed_stays_where_nothing_else_changes(tmp_path):
+    columns = {n: np.full(TIME.size, 3.0) for n in wheels()}
+    study = mjchair.read_study(write(tmp_path, columns))
+    assert set(study.channels) == set(columns)
+    assert sum("left_wheel_speed is exactly 3 throughout; was" in n for n in study.notes) == 1
 
 
 @pytest.mark.parametrize("clipped", [True, False])

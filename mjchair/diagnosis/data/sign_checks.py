@@ -125,7 +125,7 @@ def _check_equal(trial: Trial, inputs: Inputs, axle: RearAxle, wheels: Story | N
     """
     if wheels is None or np.sqrt(np.mean(wheels.values**2)) < SPUN:
         return
-    left, right = (_torque_at(inputs, side, wheels.time) for side in SIDES)
+    left, right = (torque_at(inputs, side, wheels.time) for side in SIDES)
     if _differ_less(left, right, ALIKE) and _roll_opposite(trial, axle):
         raise MjchairError(
             f"{trial.name}: the wheels roll opposite ways, and their torques are alike: does one "
@@ -141,7 +141,7 @@ def _check_opposite(trial: Trial, inputs: Inputs, axle: RearAxle, wheels: Story 
     """
     if wheels is None or np.sqrt(np.mean(wheels.values**2)) > UNSEEN * SPUN:
         return
-    left, right = (_torque_at(inputs, side, wheels.time) for side in SIDES)
+    left, right = (torque_at(inputs, side, wheels.time) for side in SIDES)
     on = np.linalg.norm(left - right) > IDLE * np.sqrt(left.size)
     if not on or not _differ_less(left, -right, ALIKE):
         return
@@ -194,7 +194,7 @@ def _moment_shares(inputs: Inputs, story: Story) -> Array:
     grid, rate = story.time, story.values
     if grid.size < FEW or np.sqrt(np.mean(rate**2)) < YAW:
         return np.zeros(2)
-    left, right = (_torque_at(inputs, side, grid) for side in SIDES)
+    left, right = (torque_at(inputs, side, grid) for side in SIDES)
     moment = right - left
     if _differ_less(left, right, ASIDE):
         return np.zeros(2)
@@ -209,7 +209,7 @@ def gains_undriven(trial: Trial, axle: RearAxle) -> bool:
 
     Something else drives it then: somebody who pushes it, a slope, or a wind.
     """
-    return trial.inputs is None and any(map(_gains_fast, _speeds(trial, axle).values()))
+    return trial.inputs is None and any(map(_gains_fast, speeds(trial, axle).values()))
 
 
 def _gains_fast(story: Story) -> bool:
@@ -218,14 +218,14 @@ def _gains_fast(story: Story) -> bool:
     return float(np.sum(np.diff(story.values)[gains[1:]])) > PUSHED
 
 
-def _speeds(trial: Trial, axle: RearAxle) -> dict[str, Story]:
+def speeds(trial: Trial, axle: RearAxle) -> dict[str, Story]:
     """Channel -> the speed forward (m/s) that it tells; of those that tell more than a moment."""
     return {n: s for n, s in forward(trial, axle).items() if s.time.size >= FEW}
 
 
 def _backward(trial: Trial, axle: RearAxle) -> list[str]:
     """A note where a chair only rolls backward: each of its signs may be turned."""
-    for name, story in _speeds(trial, axle).items():
+    for name, story in speeds(trial, axle).items():
         back = -float(np.trapezoid(story.values, story.time))
         if story.values.max() <= FORWARD and back > BACK:
             return [
@@ -239,7 +239,7 @@ def _gains(trial: Trial, axle: RearAxle) -> list[str]:
     """A note where a chair gains speed that no torque gives it."""
     if trial.inputs is not None and not _is_still(trial.inputs):
         return []
-    for name, story in _speeds(trial, axle).items():
+    for name, story in speeds(trial, axle).items():
         speed = np.abs(story.values)
         gained = float(np.max(speed - np.minimum.accumulate(speed)))
         does = f"gains {gained:.2g} m/s" if gained > PUSHED else _keeps_speed(story)
@@ -275,13 +275,13 @@ def _torque(trial: Trial, inputs: Inputs, axle: RearAxle, mass: float) -> list[s
       MjchairError: it gains speed besides while they brake, which no slope explains.
     """
     taken = lost = 0.0
-    seen, pulls = _speeds(trial, axle), []
+    seen, pulls = speeds(trial, axle), []
     for side in SIDES:
-        speeds = (seen.get(f"{side}_wheel_{kind}") for kind in ("speed", "angle"))
-        story = next((s for s in speeds if s is not None), None)
+        both = (seen.get(f"{side}_wheel_{kind}") for kind in ("speed", "angle"))
+        story = next((s for s in both if s is not None), None)
         if story is None or f"{side}_wheel" not in inputs.controls:
             continue
-        torque = _torque_at(inputs, side, story.time)
+        torque = torque_at(inputs, side, story.time)
         taken -= float(np.trapezoid(torque * story.values, story.time)) / axle.radius(side)
         ends = story.values[:3].mean(), story.values[-3:].mean()
         lost += 0.25 * mass * float(ends[0] ** 2 - ends[1] ** 2)
@@ -301,7 +301,7 @@ def _torque(trial: Trial, inputs: Inputs, axle: RearAxle, mass: float) -> list[s
     ]
 
 
-def _torque_at(inputs: Inputs, side: str, time: Array) -> Array:
+def torque_at(inputs: Inputs, side: str, time: Array) -> Array:
     """The torque of a rear wheel, averaged as channels are, at times (n,), s; N m."""
     return at(Story(*averaged(*inputs.samples(f"{side}_wheel")), ""), time)
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import mujoco
 
 from mjchair.diagnosis.data import (
+    mass_checks,
     motion_checks,
     sign_checks,
     standstill,
@@ -150,6 +151,7 @@ def make_study(
             unit_checks.check_first_speed(trial, axle, run.initial.speed)
         checked.append(replace(run, trial=trial))
         said += noticed
+    said += _weighed(checked, axle, mass)
     said += _without_heading(checked) + _coming_to_rest(checked)
     return Study(
         spec=spec,
@@ -201,6 +203,14 @@ def with_copied_wheels(study: Study) -> Study:
         for c in set(run.trial.channels) - set(before.trial.channels)
     }
     return replace(study, runs=tuple(runs), copied=frozenset(copied))
+
+
+def _weighed(runs: list[Run], axle: RearAxle, mass: float) -> list[str]:
+    """A note where torques and speeds tell another mass than the chair's, kg, with its loads."""
+    trials = {
+        run.trial.name: (run.trial, mass + (run.load.mass if run.load else 0.0)) for run in runs
+    }
+    return mass_checks.check(trials, axle)
 
 
 def _without_heading(runs: list[Run]) -> list[str]:

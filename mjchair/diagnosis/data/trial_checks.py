@@ -35,6 +35,10 @@ STILL = {  # averages below which a channel says that the chair stands, SI
 }
 STAYS = {"_angle": 0.1, "position.x": 0.05, "position.y": 0.05, "heading": 0.05}  # ranges, SI
 MOVES = (*STILL, "_angle", "position.x", "accelerometer.z")  # a rolling chair's are not zero
+SAMPLES = 10  # of one value, of which fewer say nothing
+BIAS = 0.2  # rad/s, that a gyroscope may tell at rest (assumption)
+SPEEDS = ("_speed", "velocity.x")
+CHANGES = 5.0  # times what stands still, 0.15 m/s, by which a speed changes (assumption)
 SIDES = {"left": "right", "right": "left"}
 ALIKE = 0.2  # rms of the difference of both torques over their mean: pushes alike (assumption)
 TURNS = {"imu_gyro.z", "heading", "position.y", "velocity.y"}  # tell how a chair turns
@@ -158,20 +162,59 @@ def _stands(trial: Trial) -> bool:
 
 
 def without_dead(trial: Trial) -> tuple[Trial, list[str]]:
-    """The run without channels that are zero throughout while the chair moves.
+    """The run without channels that are one value throughout while the chair moves.
+
+    Zero is one, and a gyroscope's bias, where some other channel says that the chair moves. A speed
+    of one value is, where another channel says that the speed changes.
 
     Raises:
       MjchairError: no channel is left.
     """
-    zero = {n for n, v in trial.channels.items() if not np.nan_to_num(v).any()}
-    if zero == set(trial.channels):
+    ones = {n: _one_value(trial.samples(n)[1]) for n in trial.channels}
+    still = {n: one for n, one in ones.items() if one is not None}
+    if len(still) == len(ones) and not any(still.values()):
         raise MjchairError(f"{trial.name}: every channel is zero throughout; nothing was measured")
-    dead = [n for n in trial.channels if n in zero and _end(n, MOVES)]
-    if not dead or _stands(trial):
+    others = _with_channels(trial, set(trial.channels) - set(still))
+    dead = [n for n in still if _end(n, MOVES) and _is_dead(n, still[n], trial, others)]
+    if not dead:
         return trial, []
-    left = {n: v for n, v in trial.channels.items() if n not in dead}
-    said = [f"{trial.name}: {n} is exactly zero throughout; it is left out" for n in dead]
-    return replace(trial, channels=MappingProxyType(left)), said
+    said = [
+        f"{trial.name}: {n} is exactly {f'{still[n]:.4g}' if still[n] else 'zero'} throughout; it "
+        "is left out"
+        for n in dead
+    ]
+    return _with_channels(trial, set(trial.channels) - set(dead)), said
+
+
+def _one_value(values: Array) -> float | None:
+    """The value that all samples (n,) have; None where they differ, or are too few to say."""
+    if not values.any():
+        return 0.0
+    return float(values[0]) if values.size >= SAMPLES and not np.ptp(values) else None
+
+
+def _is_dead(name: str, value: float, trial: Trial, others: Trial) -> bool:
+    """Whether a channel of one value cannot be right, by the others of its run."""
+    if value == 0.0:
+        return not _stands(trial)
+    if name.startswith("imu_gyro"):
+        return abs(value) < BIAS and not _stands(others)
+    return bool(_end(name, SPEEDS)) and _changes(others)
+
+
+def _changes(trial: Trial) -> bool:
+    """Whether a wheel, or the chair, is seen to change its speed."""
+    for name in trial.channels:
+        end = _end(name, SPEEDS)
+        _, mean = averaged(*trial.samples(name))
+        if end and mean.size and np.ptp(mean) > CHANGES * STILL[end]:
+            return True
+    return False
+
+
+def _with_channels(trial: Trial, names: set[str]) -> Trial:
+    channels = {n: v for n, v in trial.channels.items() if n in names}
+    return replace(trial, channels=MappingProxyType(channels))
 
 
 def with_angles_counted_on(trial: Trial) -> tuple[Trial, list[str]]:

@@ -14,7 +14,7 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from mjchair.diagnosis.data.trial_checks import averaged
+from mjchair.diagnosis.data.trial_checks import BIAS, averaged
 from mjchair.errors import MjchairError
 from mjchair.measurement.sensors import limit_of, rolls, sensor
 from mjchair.measurement.torque import check_torques
@@ -30,7 +30,6 @@ ALIKE = 0.95  # cosine of two stories that are one
 FORWARD, YAW, PULL = 0.05, 0.03, 0.05  # m/s, rad/s and m/s: motion below which nothing is compared
 SURELY = (0.98, 0.02)  # cosine from which so small a motion is compared, m/s: strokes make 0.04
 OTHER_START = 1.0  # m/s, and the speed itself, by which a first speed is not the one that is seen
-BIAS = 0.2  # rad/s, that a gyroscope may tell at rest (assumption)
 WAY = 0.5  # m by the wheels, below which it is not compared with the places
 FURTHER = 3.0  # times what its wheels roll that no chair gets away
 AWAY = 2.0  # m, from where it was, that a chair gets by more than turning about a wheel that stands
