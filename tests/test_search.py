@@ -64,6 +64,12 @@ ONE = Hypothesis((ROLLING,), gain=500.0, score=490.0)
 BOTH = Hypothesis((ROLLING, MOTOR), gain=900.0, score=880.0)
 
 
+class Named(str):
+    """A track by its name."""
+
+    touchy = frozenset()
+
+
 def fit(total, *keys, promised=None):
     terms = tuple(SimpleNamespace(effect=SimpleNamespace(key=k), parameters=()) for k in keys)
     return SimpleNamespace(
@@ -71,7 +77,7 @@ def fit(total, *keys, promised=None):
         confined=0.0,
         promised=total if promised is None else promised,
         variant=Variant((), terms=terms),
-        track=f"track of {'+'.join(sorted(keys))}",
+        track=Named(f"track of {'+'.join(sorted(keys))}"),
         sigmas=dict.fromkeys(keys, 3.0),
         at_bound=(),
         correlation={},
@@ -282,6 +288,39 @@ def test_a_fit_begins_once_where_more_effects_ended(monkeypatch):
     for end in (more, more, fit(1000.0, "rolling", "motor")):
         search.begin_at(ONE, end)
     assert len(made) == 2
+
+
+@pytest.mark.parametrize(
+    ("touchy", "placed", "made", "total"),
+    [
+        (True, 1451.0, 1434.0, 1434.0),
+        (True, 1451.0, 1490.0, 1486.0),  # it leads to nothing better
+        (True, 1487.0, 1434.0, 1486.0),  # the states are no better
+        (True, None, 1434.0, 1486.0),  # in which this chair cannot be
+        (False, 1451.0, 1434.0, 1486.0),  # no caster may turn over, and nothing is simulated
+    ],
+)
+def test_a_fit_takes_the_states_of_another_where_they_are_better(
+    fits, monkeypatch, touchy, placed, made, total
+):
+    """Of one window in which a caster turned over, two fits had found different valleys."""
+    there = None if placed is None else fit(placed, "rolling")
+    fits.answers |= {
+        ("rolling", "track of motor"): there,
+        ("rolling", "track of rolling"): fit(made, "rolling"),
+    }
+    monkeypatch.setattr(fits_of_hypotheses, "nuisances_of", lambda *_: {})
+    monkeypatch.setattr(fits_of_hypotheses, "placed", multistart.placed)
+    one = put(fit(1486.0), variant=Variant((), terms=fit(0.0, "rolling").variant.terms))
+    other = fit(1456.0, "motor")
+    other.track.touchy = frozenset({3} if touchy else ())
+    looking, mine, theirs = searching(), Tried(ONE, one), Tried(ONE, other)
+    better = looking.in_states_of(mine, theirs)
+    assert better.fitted.total == total
+    assert looking.in_states_of(mine, theirs) is mine  # it was tried, and what is better is kept
+    assert [t.fitted.total for t in looking.tried] == [total] * (better is not mine)
+    assert [before for _, before in fits.asked].count("track of motor") == int(touchy)
+    assert looking.in_states_of(theirs, theirs) is theirs
 
 
 def test_what_cannot_be_is_tried_once(fits):
@@ -1047,7 +1086,7 @@ def test_one_window_neither_rules_a_rival_out_nor_keeps_it(worse, stays):
     scatter = np.resize([4.0, -4.0], len(worse))
     ours = np.full(len(worse), 100.0)
     total = ours.sum()
-    bare = {"at_bound": (), "variant": Variant(())}
+    bare = {"at_bound": (), "variant": Variant(()), "track": Named("alike")}
     chosen = Tried(ONE, SimpleNamespace(confined=0.0, total=total, chi2=ours, **bare))
     theirs = ours + np.array(worse) + scatter
     rival = Tried(
@@ -1228,7 +1267,7 @@ def test_a_rival_of_one_effect_is_weighed_against_what_that_effect_brings(
     looking.near_to = lambda tried: mock.patch.object(looking, "near", looking)
     near = {}
     of_all = np.resize([4.0, -4.0], 4)
-    bare = {"at_bound": (), "variant": Variant(())}
+    bare = {"at_bound": (), "variant": Variant(()), "track": Named("alike")}
     ours = SimpleNamespace(confined=0.0, total=1_000.0, chi2=np.full(4, 250.0), **bare)
     theirs = SimpleNamespace(
         confined=0.0, total=1_000.0 + worse, chi2=250.0 + worse / 4.0 + of_all, **bare
@@ -1269,6 +1308,7 @@ def test_the_best_replacement_of_a_lone_effect_is_fitted(overstated, monkeypatch
 
     monkeypatch.setattr(rivals, "with_one_more", with_one_more)
     fit = {"at_bound": (), "variant": Variant(()), "chi2": np.full(4, 250.0)}
+    fit["track"] = Named("alike")
     looking.fit = lambda hypothesis, best=None: Tried(
         hypothesis, SimpleNamespace(confined=0.0, total=995.0, **fit)
     )

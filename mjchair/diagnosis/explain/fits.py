@@ -13,6 +13,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 from operator import attrgetter
 
+import numpy as np
+
 from mjchair.diagnosis.explain import (
     columns_anew,
     hypotheses,
@@ -36,7 +38,9 @@ from mjchair.diagnosis.explain.screening import (
     goes_far,
     nuisances_of,
 )
-from mjchair.diagnosis.fit.nonlinear import Fitted
+from mjchair.diagnosis.fit.nonlinear import Fitted, placed
+from mjchair.diagnosis.replay.window_states import Track
+from mjchair.errors import MjchairError
 
 
 class Fits:
@@ -48,6 +52,7 @@ class Fits:
       again: of some of them, the fit with everything made anew around it.
       begun: for each fit that began where one of more effects had ended: its effects, and that end.
       dropped: a line for each hypothesis that this chair cannot have.
+      exchanged: fits, each with a track in whose states it was tried.
       gaps: that fits leave, each with its fit.
       near: the linear algebra that weighs; None: that of the base. latest: the last around a fit.
     """
@@ -60,6 +65,7 @@ class Fits:
         self.again: list[Tried] = []
         self.begun: list[tuple[tuple[Start, ...], Fitted]] = []
         self.dropped: list[str] = []
+        self.exchanged: list[tuple[Fitted, Track]] = []
         self.gaps: list[tuple[Fitted, Gap]] = []
         self.near = near_fit(base, base.found) if base.found else None
         self.latest: NearFit | None = None
@@ -179,6 +185,34 @@ class Fits:
             self.tried.insert(0, made)
             if anew:
                 self.again.insert(0, made)
+
+    def in_states_of(self, tried: Tried, other: Tried) -> Tried:
+        """The fit, or a better one from the states that windows begin with in another fit.
+
+        Where a caster may turn over, a window has more than one valley, and the search of its state
+        stays in the one where it began. A load of 40 kg was 30 of chi2 behind a torque's gain for
+        one window of 15, and is 22 before it in the valley that the gain had found.
+        """
+        fitted, states = tried.fitted, other.fitted.track
+        if fitted.track is states or not fitted.track.touchy | states.touchy:
+            return tried
+        if any(one is fitted and track is states for one, track in self.exchanged):
+            return tried
+        self.exchanged.append((fitted, states))
+        bench, columns = self.base.bench, nuisances_of(self.base, fitted)
+        try:
+            there = placed(bench, fitted.variant, states, columns)
+        except (MjchairError, np.linalg.LinAlgError):  # in another's states no chair need be
+            return tried
+        if there.total > fitted.total - search_rules.NOTHING:
+            return tried
+        self.say(f"fit of {tried.hypothesis.label}, from where {other.hypothesis.label} begins")
+        made = made_anew(bench, fitted.variant, there.track)
+        if made is None or made.total >= fitted.total:
+            return tried
+        better = Tried(tried.hypothesis, made)
+        self.keep_better(better)
+        return better
 
     def anew(self, tried: Tried) -> Fitted:
         """The fit with everything made anew around it, where that may change what it says."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
+from itertools import chain
 from operator import attrgetter, itemgetter
 
 import numpy as np
@@ -39,6 +40,8 @@ def against_rivals(fits: Fits, chosen: Tried) -> tuple[Tried, list[list[Tried]]]
     """
     rivals = rivals_of(fits, chosen)
     for _ in range(SWAPS):
+        for rival in chain.from_iterable(rivals):
+            chosen = fits.in_states_of(chosen, rival)
         own = own_gains(fits, chosen)
         better = better_of(
             fits, chosen, [(r, g) for group, g in zip(rivals, own, strict=True) for r in group]
@@ -132,9 +135,8 @@ def _rivals(fits: Fits, chosen: Tried, start: Start, own: float) -> list[Tried]:
     tried += _in_place_of(fits.tried, chosen.hypothesis, start, [h.keys for h in near])
     return [
         t
-        for t in tried
-        if t is not None
-        and is_there(t.fitted)
+        for t in (fits.in_states_of(t, chosen) for t in tried if t is not None)
+        if is_there(t.fitted)
         and _not_ruled_out(t, chosen, own, _harm(fits.base, t.fitted, chosen.fitted))
     ]
 
