@@ -524,6 +524,20 @@ def test_a_rival_takes_the_place_only_once_both_are_made_anew(rival, takes, fits
     assert best.hypothesis is (motor if takes else ONE)
 
 
+def test_the_chosen_effects_take_the_states_of_their_rivals(fits, monkeypatch):
+    """Stuck, they would give way to a rival that fits worse than they do in its states."""
+    for name in ("rolling", "motor"):
+        fits.answers[name, f"track of {name}"] = fit(1108.0, name)
+    believe(monkeypatch, lambda _: True)
+    looking = searching()
+    chosen, better = (Tried(ONE, fit(total, "rolling")) for total in (1130.0, 1100.0))
+    rival = Tried(Hypothesis((MOTOR,), gain=500.0, score=490.0), fit(1110.0, "motor"))
+    monkeypatch.setattr(rivals, "rivals_of", lambda *_: [[rival]])
+    looking.in_states_of = lambda one, other: better if (one, other) == (chosen, rival) else one
+    fits.answers["rolling", "track of rolling"] = better.fitted
+    assert rivals.against_rivals(looking, chosen)[0] is better
+
+
 @pytest.mark.parametrize(("behind", "takes"), [(3.0, True), (30.0, True), (80.0, False)])
 def test_the_more_common_of_two_effects_comes_first_within_their_form(
     behind, takes, fits, monkeypatch
