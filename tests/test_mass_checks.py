@@ -89,7 +89,7 @@ def test_what_tells_no_mass_says_nothing(trial):
 
 
 def test_a_torque_that_does_not_go_with_the_speed_tells_no_mass():
-    """A third of a stroke late, it goes with a tenth of the mass, and explains half of itself."""
+    """An eighth of a stroke late, it would go with a fifth of the mass."""
     one = pushed(speeds=3.6)
     late = Inputs(TIME + 0.12, one.inputs.controls, "run")
     assert said(Trial("run", TIME, one.channels, late, one.other)) == []
