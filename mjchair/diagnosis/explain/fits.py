@@ -191,7 +191,7 @@ class Fits:
 
         Where a caster may turn over, a window has more than one valley, and the search of its state
         stays in the one where it began. A load of 40 kg was 30 of chi2 behind a torque's gain for
-        one window of 15, and is 22 before it in the valley that the gain had found.
+        one window of 15, and is 20 before it in the valley that the gain had found.
         """
         fitted, states = tried.fitted, other.fitted.track
         if fitted.track is states or not fitted.track.touchy | states.touchy:
