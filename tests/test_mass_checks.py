@@ -1,6 +1,7 @@
 """Torques and speeds that go with another mass than the study's are said, or refused."""
 
 import re
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -37,7 +38,9 @@ def pushed(mass=MASS, split=0.5, seen=("left", "right"), speeds=1.0, strokes=0.3
 
 
 def said(*trials, mass=MASS):
-    return mass_checks.check({f"run{k}": (t, mass) for k, t in enumerate(trials)}, AXLE)
+    return mass_checks.check(
+        [(replace(t, name=f"run{k}"), mass) for k, t in enumerate(trials)], AXLE
+    )
 
 
 @pytest.mark.parametrize("mass", [60.0, 90.0, 145.0])

@@ -2,13 +2,13 @@
 
 In: runs, the rear axle of the chair and its mass. Out: notes, or one line that names what may be in
 other units. By Newton's second law the impulse of the torques at the rear wheels is mass times what
-the chair gains in speed, but for a steady resistance and one in proportion to speed. Of what no
-other channel contradicts, this sees km/h, forces at the rim in N, pounds, and a rider left out.
+the chair gains in speed, but for a steady resistance and one in proportion to speed. This finds
+km/h, forces at the rim in N, pounds and a missing rider where no other channel contradicts them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -29,29 +29,30 @@ SEEN = 1.0  # N s rms of an impulse, below which it tells nothing: strokes make 
 TOLD = 0.8  # of the variance of an impulse, that must go with the speed (0.84 with strokes)
 
 
-def check(trials: Mapping[str, tuple[Trial, float]], axle: RearAxle) -> list[str]:
+def check(trials: Iterable[tuple[Trial, float]], axle: RearAxle) -> list[str]:
     """Refuse units that no chair of this mass can have, and note a doubtful mass.
 
+    The run in the middle speaks for all: a single run may have another fault.
+
     Args:
-      trials: name -> the run, and the mass of chair, rider and load, kg. axle: of the chair.
+      trials: each run, and the mass of chair, rider and load, kg. axle: of the chair.
 
     Raises:
       MjchairError: torques and speeds tell a mass WRONG times as large, or as small, as is given.
     """
-    told = {name: (_mass(t, axle), given) for name, (t, given) in trials.items()}
-    ratios = {name: mass / given for name, (mass, given) in told.items() if mass > 0.0}
-    if not ratios:
+    masses = [(_mass(trial, axle), given, trial.name) for trial, given in trials]
+    told = sorted((mass / given, name, mass, given) for mass, given, name in masses if mass > 0.0)
+    if not told:
         return []
-    name = sorted(ratios, key=lambda n: ratios[n])[len(ratios) // 2]
-    off = max(ratios[name], 1.0 / ratios[name])
+    ratio, name, mass, given = told[len(told) // 2]
+    off = max(ratio, 1.0 / ratio)
     if off < DOUBTFUL:
         return []
-    mass, given = told[name]
     said = (
         f"{name}: its torques and speeds go with a mass of {mass:.0f} kg, and the study gives "
         f"{given:.0f} kg"
     )
-    asked = _doubts(ratios[name])
+    asked = _doubts(ratio)
     if off > WRONG:
         raise MjchairError(f"{said}: {asked}? Give SI units, or the unit in the header")
     return [f"{said}: {asked}?"]

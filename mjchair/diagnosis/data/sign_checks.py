@@ -277,8 +277,8 @@ def _torque(trial: Trial, inputs: Inputs, axle: RearAxle, mass: float) -> list[s
     taken = lost = 0.0
     seen, pulls = speeds(trial, axle), []
     for side in SIDES:
-        both = (seen.get(f"{side}_wheel_{kind}") for kind in ("speed", "angle"))
-        story = next((s for s in both if s is not None), None)
+        stories = (seen.get(f"{side}_wheel_{kind}") for kind in ("speed", "angle"))
+        story = next((s for s in stories if s is not None), None)
         if story is None or f"{side}_wheel" not in inputs.controls:
             continue
         torque = torque_at(inputs, side, story.time)

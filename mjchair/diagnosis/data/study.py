@@ -207,10 +207,8 @@ def with_copied_wheels(study: Study) -> Study:
 
 def _weighed(runs: list[Run], axle: RearAxle, mass: float) -> list[str]:
     """A note where torques and speeds tell another mass than the chair's, kg, with its loads."""
-    trials = {
-        run.trial.name: (run.trial, mass + (run.load.mass if run.load else 0.0)) for run in runs
-    }
-    return mass_checks.check(trials, axle)
+    loaded = ((run.trial, mass + (run.load.mass if run.load else 0.0)) for run in runs)
+    return mass_checks.check(loaded, axle)
 
 
 def _without_heading(runs: list[Run]) -> list[str]:

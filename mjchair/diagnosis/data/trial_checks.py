@@ -164,8 +164,8 @@ def _stands(trial: Trial) -> bool:
 def without_dead(trial: Trial) -> tuple[Trial, list[str]]:
     """The run without channels that are one value throughout while the chair moves.
 
-    Zero is one, and a gyroscope's bias, where some other channel says that the chair moves. A speed
-    of one value is, where another channel says that the speed changes.
+    A channel of zeros, and a gyroscope that shows a bias alone, are left out where another channel
+    says that the chair moves; a speed of one value, where another says that the speed changes.
 
     Raises:
       MjchairError: no channel is left.

@@ -133,9 +133,10 @@ def _rivals(fits: Fits, chosen: Tried, start: Start, own: float) -> list[Tried]:
         ]
     tried = [fits.fit(h, chosen) for h in near[: REFITTED if not others else BESIDE]]
     tried += _in_place_of(fits.tried, chosen.hypothesis, start, [h.keys for h in near])
+    made = [fits.in_states_of(t, chosen) for t in tried if t is not None]
     return [
         t
-        for t in (fits.in_states_of(t, chosen) for t in tried if t is not None)
+        for t in made
         if is_there(t.fitted)
         and _not_ruled_out(t, chosen, own, _harm(fits.base, t.fitted, chosen.fitted))
     ]
