@@ -297,13 +297,13 @@ def test_a_fit_begins_once_where_more_effects_ended(monkeypatch):
         (True, 1451.0, 1490.0, 1486.0),  # it leads to nothing better
         (True, 1487.0, 1434.0, 1486.0),  # the states are no better
         (True, None, 1434.0, 1486.0),  # in which this chair cannot be
-        (False, 1451.0, 1434.0, 1486.0),  # no caster may turn over, and nothing is simulated
+        (False, 1451.0, 1434.0, 1486.0),  # no window is touchy, and nothing is simulated
     ],
 )
 def test_a_fit_takes_the_states_of_another_where_they_are_better(
     fits, monkeypatch, touchy, placed, made, total
 ):
-    """Of one window in which a caster turned over, two fits had found different valleys."""
+    """Of one window, in which the chair stands, two fits had found different valleys."""
     there = None if placed is None else fit(placed, "rolling")
     fits.answers |= {
         ("rolling", "track of motor"): there,

@@ -189,9 +189,10 @@ class Fits:
     def in_states_of(self, tried: Tried, other: Tried) -> Tried:
         """The fit, or a better one from the states that windows begin with in another fit.
 
-        Where a caster may turn over, a window has more than one valley, and the search of its state
-        stays in the one where it began. A load of 40 kg was 30 of chi2 behind a torque's gain for
-        one window of 15, and is 20 before it in the valley that the gain had found.
+        The state of a window may have more than one valley, and its search stays in the one where
+        it began. That is asked only of fits with a touchy window. A load of 40 kg was 30 of chi2
+        behind a torque's gain for one window of 15, in which the chair stands after a spin, and is
+        20 before it in the valley that the gain had found.
         """
         fitted, states = tried.fitted, other.fitted.track
         if fitted.track is states or not fitted.track.touchy | states.touchy:
