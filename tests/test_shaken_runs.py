@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from mjchair.diagnosis import decide
+from mjchair.diagnosis.explain import noise_shown
 from mjchair.diagnosis.explain.noise_shown import forward_levels
-from mjchair.diagnosis.fit.process import NAMED
+from mjchair.diagnosis.fit.process import NAMED, Part
 
 FAST, SLOW = NAMED["drive"][0]
 LIMIT = 1.2  # N
@@ -52,3 +53,25 @@ def test_only_what_shakes_a_run_harder_than_its_like_and_matters_is_found(runs, 
 def test_the_level_is_that_of_the_fast_and_the_slow_part_together():
     ((runs),) = forward_levels(bench(a=("push", True, PUSH)))
     assert runs == {"a": pytest.approx(5.0)}
+
+
+@pytest.mark.parametrize(
+    ("side", "channels", "shown"),
+    [
+        (0.5, ("left_wheel_speed",), False),
+        (0.5, ("left_wheel_speed", "imu_accelerometer.y"), True),
+        (1.0, ("left_wheel_speed",), True),
+    ],
+)
+def test_what_is_said_to_be_loud_has_its_level(monkeypatch, side, channels, shown):
+    """Sticking casters in wheel speeds alone: a sideways level was loud, and no level was there."""
+    shares = dict.fromkeys(noise_shown.SHAKING, 0.5) | {"side": side}
+    monkeypatch.setattr(noise_shown, "shares", lambda _: shares)
+    levels = {part: np.array([2.0]) for part in Part}
+    shaken = SimpleNamespace(
+        process=SimpleNamespace(levels=levels, person=np.zeros(3)),
+        simulator=SimpleNamespace(channels=channels, study=SimpleNamespace(process={})),
+    )
+    found = decide._process(SimpleNamespace(bench=shaken))
+    assert ("side" in found) is shown
+    assert found.keys() >= set(noise_shown.at_most(shaken))

@@ -283,13 +283,15 @@ def _process(base: Base) -> dict[str, Estimate]:
     """Standard deviation of what shakes the chair, by the names of [noise.process].
 
     Of a person, the share of the force that is in no model; only where a person moves. Sideways
-    only where a channel looks there.
+    only where a channel looks there, or where as much is found as is believed: casters turn and
+    wheels are slowed by such a force as well.
     """
     process = base.bench.process
     if process is None:
         return {}
     aside = any(channel.endswith(".y") for channel in base.bench.simulator.channels)
-    unseen = {"person": not process.person.any(), "side": not aside}
+    loud = "side" in noise_shown.at_most(base.bench)
+    unseen = {"person": not process.person.any(), "side": not aside and not loud}
     return {
         name: Estimate(value=level(process.levels, name), std=None, unit=unit)
         for name, (_, unit) in NAMED.items()
