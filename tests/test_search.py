@@ -691,26 +691,41 @@ def test_two_effects_may_stand_in_the_place_of_one():
     assert alone[1:] == [["rolling", "one_run"]]
 
 
-@pytest.mark.parametrize("cannot_be", [False, True])
-def test_what_linear_algebra_finds_probable_is_fitted_before_the_verdict(cannot_be, monkeypatch):
+@pytest.mark.parametrize(
+    ("probability", "score", "fitted", "cannot_be"),
+    [
+        (0.12, 470.0, True, False),
+        (0.12, 470.0, True, True),
+        (0.011, 470.0, False, False),
+        (0.011, 491.0, True, False),  # linear algebra promises more of it than of what is chosen
+        (0.004, 491.0, False, False),
+    ],
+)
+def test_what_linear_algebra_finds_probable_or_better_is_fitted_before_the_verdict(
+    probability, score, fitted, cannot_be, monkeypatch
+):
     """The friction of a bearing closed the gap, so no pair had been fitted."""
     motor, wind = Hypothesis((MOTOR,), 480.0, 470.0), Hypothesis((WIND,), 400.0, 390.0)
-    pair = Hypothesis((MOTOR, WIND), 490.0, 470.0)
-    known = {"rolling": 0.7, "motor": 0.14, pair.name: 0.12, "wind": 0.01, "outside": 0.03}
+    pair = Hypothesis((MOTOR, WIND), 490.0, score)
+    more = replace(BOTH, score=2.0 * score)  # with the choice in it: that is no other
+    known = {"rolling": 0.7, "motor": 0.14, "wind": 0.01, "outside": 0.03, more.name: 0.01}
+    known[pair.name] = probability
     monkeypatch.setattr(probable, "probabilities", lambda *_: known)
     monkeypatch.setattr(hypotheses, "singles", lambda *_: [ONE, motor, wind])
-    monkeypatch.setattr(hypotheses, "pairs", lambda *_: [BOTH, pair])
+    monkeypatch.setattr(hypotheses, "pairs", lambda *_: [more, pair])
     choice = chosen(ONE, [(ONE, 1e3), (motor, 1010.0)], [500.0])
     asked = []
     looking = SimpleNamespace(
         base=SimpleNamespace(reduced=None, starts=()),
         tried=choice.tried,
+        weigh=lambda starts: ONE,
         fit=lambda h, best: asked.append(h.name) or (None if cannot_be else Tried(h, best.fitted)),
     )
     monkeypatch.setattr(probable, "better_of", lambda fits, chosen, found: found)
     found = probable.better_than(looking, choice)
-    assert asked == [pair.name]  # the motor was fitted before, and wind is not probable
-    assert [(t.hypothesis, by) for t, by in found] == ([] if cannot_be else [(pair, 500.0)])
+    assert asked == [pair.name] * fitted  # the motor was fitted before, and wind is not probable
+    there = fitted and not cannot_be
+    assert [(t.hypothesis, by) for t, by in found] == ([(pair, 500.0)] if there else [])
 
 
 def test_one_effect_may_stand_in_the_place_of_two_and_nothing_in_that_of_one():
