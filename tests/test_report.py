@@ -267,6 +267,16 @@ def test_what_the_corrected_chair_has_besides_is_to_be_measured_first():
     assert "the mass of chair and person together by +38 % besides" in first_screen.next_step(much)
 
 
+@pytest.mark.parametrize("verdict", [Verdict.NAMED, Verdict.AMBIGUOUS, Verdict.NONE])
+def test_what_the_data_ask_is_to_be_answered_first(verdict):
+    """A mass of 180 "kg", which was in lb, came as torques that show 93 % too little: use it."""
+    found = diagnosis(verdict)
+    plain = first_screen.next_step(found)
+    asked = "push_1: its torques go with a mass of 90 kg: are the masses in lb?"
+    doubtful = dataclasses.replace(found, notes=[asked, *found.notes, asked])
+    assert first_screen.next_step(doubtful) == f"Answer first: {asked} {plain}"
+
+
 def test_one_run_is_not_called_several():
     found = diagnosis()
     one = dataclasses.replace(found.evidence, trials=found.evidence.trials[1:2])

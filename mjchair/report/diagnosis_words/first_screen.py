@@ -316,7 +316,13 @@ def _stated(explanation: Explanation, leaves: bool) -> str:
 
 
 def next_step(diagnosis: Diagnosis) -> str:
-    """What to do next, in one sentence."""
+    """What to do next, in one sentence; before it what the data ask, such as the unit of a mass."""
+    asked = dict.fromkeys(note for note in diagnosis.notes if note.endswith("?"))
+    return "".join(f"Answer first: {note} " for note in asked) + _then(diagnosis)
+
+
+def _then(diagnosis: Diagnosis) -> str:
+    """The experiment to do next, or what to do where none is needed."""
     if not diagnosis.next_experiment:
         if diagnosis.verdict == Verdict.NONE:
             if diagnosis.shaken is not None:
