@@ -25,7 +25,7 @@ from mjchair.diagnosis.explain.probability import probabilities, shown
 from mjchair.diagnosis.explain.rivals import better_of
 
 FITTED = 3  # hypotheses, at most
-SMALL = 0.005  # probability of the least probable that is fitted
+LEAST = 0.005  # probability of what is fitted
 
 
 def better_than(fits: Fits, choice: Choice) -> Tried | None:
@@ -49,13 +49,11 @@ def _not_yet_fitted(fits: Fits, choice: Choice) -> list[Hypothesis]:
     best single one."""
     probability = probabilities(fits.base, choice)
     known = {t.hypothesis.name for t in fits.tried}
+    unfitted = {n for n, p in probability.items() if p > LEAST} - known
     reduced, starts = fits.base.reduced, fits.base.starts
     singles = hypotheses.singles(reduced, starts)
-    found = [
-        h
-        for h in (*singles, *hypotheses.pairs(reduced, starts))
-        if h.name not in known and probability.get(h.name, 0.0) > SMALL
-    ]
+    pairs = hypotheses.pairs(reduced, starts) if unfitted else []
+    found = [h for h in (*singles, *pairs) if h.name in unfitted]
     if found:
         worth = shown(probability, choice.hypothesis.name)
         promised = fits.weigh(choice.hypothesis.starts)

@@ -316,7 +316,7 @@ def _stated(explanation: Explanation, leaves: bool) -> str:
 
 
 def next_step(diagnosis: Diagnosis) -> str:
-    """What to do next, in one sentence; before it what the data ask, such as the unit of a mass."""
+    """What to do next, in one sentence, after what the data ask: the notes that end with "?"."""
     asked = dict.fromkeys(note for note in diagnosis.notes if note.endswith("?"))
     return "".join(f"Answer first: {note} " for note in asked) + _then(diagnosis)
 
