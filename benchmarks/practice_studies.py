@@ -59,7 +59,7 @@ def _said(found: Diagnosis) -> str:
             f"{name} {p.value:.3g} ± {p.std:.2g}" for name, p in effect.parameters.items() if p.std
         ]
         said.append(f"{effect.name}: {', '.join(numbers)}")
-    others = {name for one in found.alternatives for name in one} - {e.name for e in found.effects}
+    others = {name for one in found.alternatives for name in one} - {e.key for e in found.effects}
     return "; ".join(said) + (f"; or {', '.join(sorted(others))}" if others else "")
 
 

@@ -13,7 +13,7 @@ from noisy_run import NOISE, noisy_run
 import mjchair
 from mjchair.diagnosis import decide, diagnose
 from mjchair.diagnosis.data.roughly_known import MECHANICAL, Nuisance
-from mjchair.diagnosis.data.study import make_study
+from mjchair.diagnosis.data.study import Run, make_study
 from mjchair.diagnosis.explain.candidates import Around, collect
 from mjchair.diagnosis.explain.column_ids import Driver, Quantity
 from mjchair.diagnosis.fit import process
@@ -30,8 +30,10 @@ from mjchair.diagnosis.replay.window_states import track
 from mjchair.effects.effect import Effect, Parameter, SensorError
 from mjchair.effects.library import find
 from mjchair.errors import MjchairError
+from mjchair.measurement.trial import Trial
 from mjchair.model import inertials
 from mjchair.simulation.initial import Initial, start
+from mjchair.simulation.inputs import Inputs
 
 TRUTH = {"coefficient": 0.002}
 ONE_WAY = (Initial((0.0, 0.0), 0.3, 1.5), Initial((0.0, 0.5), 0.3, 1.2))
@@ -87,6 +89,35 @@ def test_a_wind_is_told_from_drag_by_a_fast_coast_the_other_way(one_way):
     found = design.plan(bench, air, [wind], few, doubts=())
     least = {e.manoeuvre.name: e.least for e in found.experiments}
     assert least["fast coast reversed"] > 2.0 * least["coast reversed"]
+
+
+@pytest.mark.parametrize(
+    ("controls", "torque", "run"),
+    [
+        ({}, 0.0, "first"),
+        ({"joystick_x": 1.0}, 0.0, "first"),  # shares are no N m
+        ({"left_wheel": 6.0, "right_wheel": 12.0, "rider_lean": 40.0}, 12.0, "coast"),
+        ({"chair/left_wheel": 6.0}, 6.0, "coast"),
+    ],
+)
+def test_the_largest_torque_is_that_of_wheels(controls, torque, run):
+    """A joystick at its end asked for runs "with up to 1 N m a wheel"."""
+    time = np.arange(0.0, 3.0, 0.05)
+    seen = {"left_wheel_speed": 3.0 - 0.1 * time, "right_wheel_speed": 3.0 - 0.1 * time}
+    given = {name: np.full(time.size, size) for name, size in controls.items()}
+    inputs = Inputs(time, given, "first") if given else None
+    runs = [
+        Run(Trial(name, time, seen, by, {}), "", False, Initial(), frozenset())
+        for name, by in (("first", inputs), ("coast", None))
+    ]
+    here = setting(replace(make_study(mjchair.load_spec(), runs[1:]), runs=tuple(runs)))
+    assert (here.torque, here.run) == (torque, run)
+
+
+def test_two_sensors_together_are_worded_as_two():
+    keys = "sensor_scale:left_wheel_speed and wheel_radius"
+    words = "sensor scale of left_wheel_speed and wheel radius"
+    assert wording.plain_together(keys) == words
 
 
 def test_what_is_promised_is_what_the_experiment_gives(one_way, against_slope):

@@ -11,7 +11,7 @@ from mjchair.diagnosis.explain import open_ended
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.result import Estimate
-from mjchair.effects import caster_friction
+from mjchair.effects import bearing_friction, caster_friction
 from mjchair.effects.library import find
 from mjchair.errors import MjchairError
 
@@ -146,6 +146,23 @@ def test_each_caster_that_is_stuck_has_a_least_size_of_its_own(monkeypatch):
     assert set(found.at_least) == {keys["left"]}
     assert found.at_least[keys["left"]] == pytest.approx(0.3, rel=RESOLVED)
     assert found.std[keys["left"]] > 3.0 and found.std[keys["right"]] == 0.03
+
+
+def test_a_side_on_which_there_is_nothing_is_not_looked_at(monkeypatch):
+    """A fit clips the second side to its bound, which is no size: 0 was divided by 0."""
+    term = Term(bearing_friction.ONE_SIDED, {"left": 0.5, "right": 0.0}, ("left", "right"))
+    held = []
+
+    def refit(bench, begin, track, nuisances, rounds=None):
+        held.append(begin.terms[0].values)
+        return End(begin, PLAIN, PLAIN)
+
+    monkeypatch.setattr(open_ended, "refit", refit)
+    monkeypatch.setattr(open_ended, "nuisances_of", lambda *_: {})
+    base = SimpleNamespace(bench=None, plain=SimpleNamespace(total=PLAIN))
+    begun = End(Variant((), terms=(term,)), 3000.0, 3000.0)
+    assert open_ended.with_least_sizes(base, begun) is begun
+    assert {values["right"] for values in held} == {0.0}
 
 
 def test_a_size_in_two_directions_is_not_looked_at(monkeypatch):

@@ -220,7 +220,8 @@ def test_it_is_said_why_what_fits_is_not_named():
 def test_noise_that_is_larger_than_the_study_says_is_told(monkeypatch):
     of = {"a": 0.0046, "b": 0.004, "c": 0.2}
     noise = {c: SimpleNamespace(total=v, source="study.toml") for c, v in of.items()}
-    study = SimpleNamespace(notes=[], unplaced=(), copied=(), noise={"a": 0.0005, "b": 0.0041})
+    given = {"a": 0.0005, "b": 0.0041}
+    study = SimpleNamespace(notes=[], unplaced=(), copied=(), noise_given=given.get)
     bench = SimpleNamespace(
         simulator=SimpleNamespace(study=study), noise=noise, tipped={}, process=None
     )
@@ -353,7 +354,7 @@ def test_what_is_named_beside_more_that_is_missing_is_no_last_word():
     assert "look for what is left" in first_screen.next_step(found)
     assert "of the gap. The model of the chair lacks" in first_screen.missing(found)
     found.gap = dataclasses.replace(found.gap, scope="held-out trials")
-    falls = "of the gap in the runs of the fit; in those held out it falls from 3.0 to 0.9 times"
+    falls = "of the gap in the runs of the fit; in those held out it falls from 3.00 to 0.90 times"
     assert falls in first_screen.missing(found)
     found.gap = dataclasses.replace(found.gap, after=2.95)
     assert "of the fit; those held out stay at 3.0 times the" in first_screen.missing(found)
@@ -880,6 +881,48 @@ def test_a_gap_that_roughly_known_numbers_make_is_told_where_nothing_is_missing(
     assert "3.2 times the noise that the chair leaves on held-out runs, all but 1.1 can" in said
     found.gap = dataclasses.replace(gap, unforeseen=3.0)
     assert "times the noise that" not in first_screen.missing(found)
+
+
+def test_a_gap_that_only_held_out_runs_show_is_no_gap_of_the_others():
+    """p = 0.4 was "more than noise", and beside 1.6 times the noise held out nothing was left."""
+    gap = GapSummary(before=1.6, after=None, scope="held-out trials: rms", p_value=0.4,
+                     p_value_after=None, only_held_out=True)  # fmt: skip
+    found = dataclasses.replace(diagnosis(Verdict.NONE), gap=gap, material=Material(0.5, 1.2))
+    told = {word: sections.gap_words(dataclasses.replace(found, verdict=word)) for word in Verdict}
+    assert all("foretells the held-out runs worse" in words for words in told.values())
+    assert "more than noise is left in the runs held out, but" in first_screen.missing(found)
+    assert "does not matter" in sections.choice_words(found)
+    found.gap = dataclasses.replace(gap, only_held_out=False)
+    assert sections.gap_words(found).endswith("Nothing shows.")
+    assert "no gap to explain" in sections.choice_words(found)
+
+
+def test_an_answer_without_a_plan_does_not_decide():
+    """ "Probably (90 %)" was followed by "These data decide; use the corrected chair"."""
+    found = dataclasses.replace(diagnosis(Verdict.AMBIGUOUS), next_experiment="")
+    assert first_screen.next_step(found).startswith("These data do not decide")
+    found = dataclasses.replace(found, verdict=Verdict.NAMED, alternatives=[])
+    assert first_screen.next_step(found).startswith("These data decide; use")
+
+
+def test_that_nothing_stands_there_is_said_as_such():
+    """It was "these runs do not rule out nothing", and 99.8 % was 100 %."""
+    found = diagnosis(Verdict.AMBIGUOUS)
+    found.alternatives = [["rolling_resistance", "none"]]
+    found.probability = {"rolling_resistance": 0.998, "none": 0.002}
+    said = first_screen.missing(found)
+    assert "(more than 99 %), but these runs do not rule out that nothing stands there." in said
+
+
+def test_one_encoder_or_the_other_is_said_with_both():
+    """The report ended in a ValueError: the set held one name."""
+    found = diagnosis(Verdict.AMBIGUOUS)
+    channels = [f"sensor_scale:{side}_wheel_speed" for side in ("left", "right")]
+    found.alternatives = [channels]
+    assert sections.alike_words(found) == (
+        "These data cannot tell **sensor scale of left_wheel_speed** from "
+        "**sensor scale of right_wheel_speed**."
+    )
 
 
 def test_a_run_that_is_shaken_far_harder_is_said_where_nothing_is_missing():

@@ -728,6 +728,18 @@ def test_what_linear_algebra_finds_probable_or_better_is_fitted_before_the_verdi
     assert [(t.hypothesis, by) for t, by in found] == ([(pair, 500.0)] if there else [])
 
 
+def test_the_same_error_of_two_sensors_is_two_alternatives():
+    """One encoder or the other was told as [["sensor_scale"]], and the report could not be made."""
+    left, right = (effect(f"sensor_scale:{side}_wheel_speed") for side in ("left", "right"))
+    for one in (left, right):
+        one.effect.name = "sensor_scale"
+    first, second = Hypothesis((left,), 500.0, 490.0), Hypothesis((right,), 499.0, 489.0)
+    choice = chosen(first, [(first, 1e3), (second, 1001.0)], [500.0])
+    found = rivals.with_probable(choice, {first.name: 0.5, second.name: 0.5})
+    sets = decide._alternatives(found, once=False, alone=None)
+    assert sets == [["sensor_scale:left_wheel_speed", "sensor_scale:right_wheel_speed"]]
+
+
 def test_one_effect_may_stand_in_the_place_of_two_and_nothing_in_that_of_one():
     wind = Hypothesis((WIND,), 490.0, 470.0)
     choice = chosen(BOTH, [(BOTH, 1e3), (wind, 1020.0), (ONE, 1030.0)], [400.0, 30.0])

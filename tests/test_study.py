@@ -6,9 +6,10 @@ import pytest
 
 import mjchair
 from mjchair.diagnosis.data import first_state, standstill
-from mjchair.diagnosis.data.study import Run, with_copied_wheels
+from mjchair.diagnosis.data.study import Run, make_study, with_copied_wheels
 from mjchair.diagnosis.data.windows import calm, cut
 from mjchair.diagnosis.driven_run import drive_run
+from mjchair.diagnosis.explain import screening
 from mjchair.diagnosis.replay import noise
 from mjchair.errors import MjchairError
 from mjchair.measurement import samples
@@ -244,6 +245,62 @@ def test_a_torque_at_its_sensors_end_is_said(clipped, tmp_path):
     study = mjchair.read_study(write(tmp_path, columns, head=head))
     ends = [n for n in study.notes if "exactly 8, its largest value" in n]
     assert len(ends) == (2 if clipped else 0), study.notes
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_end_of_a_sensor_is_called_by_its_side_and_not_by_its_sign(sign, tmp_path):
+    """-2 above -10 was called the least value."""
+    clipped = np.minimum(6.0 + 4.0 * np.sin(5.0 * TIME), 8.0)
+    columns = wheels() | {"left_wheel": sign * clipped, "right_wheel": sign * (clipped - 10.0)}
+    head = 'model = "manual"\ntorque = "measured"\n'
+    study = mjchair.read_study(write(tmp_path, columns, head=head))
+    which = "largest" if sign > 0.0 else "least"
+    for value in (8.0 * sign, -2.0 * sign):
+        assert sum(f"exactly {value:g}, its {which} value" in n for n in study.notes) == 1
+
+
+def test_noise_may_be_given_of_a_sensor_or_of_a_channel(tmp_path):
+    columns = wheels() | {"imu_gyro.z": 0.1 + 0.01 * TIME}
+    told = '[noise]\n"imu_gyro" = 0.01\n"left_wheel_speed" = 0.02\n'
+    study = mjchair.read_study(write(tmp_path, columns, extra=told))
+    channels = ("imu_gyro.z", "left_wheel_speed", "right_wheel_speed")
+    assert [study.noise_given(c) for c in channels] == [0.01, 0.02, None]
+
+
+def test_two_runs_of_one_name_are_told_apart(tmp_path):
+    """One folder a day: what was said of coast was said of both."""
+    for day, factor in (("mon", 1.0), ("tue", 1.1), ("wed", 1.2)):
+        (tmp_path / day).mkdir()
+        write(tmp_path / day, wheels(factor))
+    trials = "".join(f'[[trial]]\nfile = "{day}/a.csv"\n' for day in ("mon", "tue", "wed"))
+    (tmp_path / "study.toml").write_text(f'model = "manual"\n{trials}')
+    study = mjchair.read_study(tmp_path)
+    assert [run.trial.name for run in study.runs] == ["a", "a_2", "a_3"]
+    assert sum("trial 2 is called a_2, since another is a" in note for note in study.notes) == 1
+
+
+@pytest.mark.parametrize("held_out", [False, True])
+def test_a_run_without_a_window_is_left_out_and_said(held_out):
+    """A stand of 2 s at 20 Hz, of which 2 s settle: the diagnosis ended in a KeyError."""
+    spec = mjchair.load_spec("manual")
+    time = np.arange(0.0, 2.0001, 0.05)
+    speed = np.interp(np.arange(0.0, 4.0, 0.05), [0.0, 4.0], [6.0, 4.0])
+    moves = {f"{side}_wheel_speed": speed for side in SIDES}
+    stands = {f"{side}_wheel_speed": 1e-4 * np.cos(9.0 * time) for side in SIDES}
+    runs = [
+        Run(Trial("coast", np.arange(0.0, 4.0, 0.05), moves, None, {}), "coast", held_out,
+            Initial(), frozenset()),
+        Run(Trial("stand", time, stands, None, {}), "stand", False, Initial(), frozenset()),
+    ]  # fmt: skip
+    study = make_study(spec, runs)
+    if held_out:
+        with pytest.raises(MjchairError, match=r"stand: too few samples .* no other trial"):
+            screening._of_windows(study, None, 1)
+        return
+    simulator = screening._of_windows(study, None, 1)
+    assert [run.trial.name for run in simulator.study.runs] == ["coast"]
+    assert {w.run for w in simulator.windows} == {0}
+    assert "stand: too few samples" in simulator.study.notes[-1]
 
 
 @pytest.mark.parametrize(("share", "copied"), [(1.0, True), (0.95, True), (0.6, False)])

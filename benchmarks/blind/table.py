@@ -45,7 +45,7 @@ def returned(line: dict) -> set[str]:
     if line["verdict"] not in ("named", "ambiguous"):
         return set()
     rivals = {n for g in line["alternatives"] for names in g for n in names.split("+")}
-    return put_first(line) | rivals
+    return put_first(line) | {n.split(":")[0] for n in rivals}  # without the channel of a sensor
 
 
 def first(line: dict) -> str:

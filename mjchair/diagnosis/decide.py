@@ -87,6 +87,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
     alone = in_one_run(base, gap, choice) if gap.exists else None
     sure_alone = alone if alone and alone.sure else None
     chance = min(gap.p, sure_alone.p) if sure_alone else gap.p
+    chance = min(chance, rules.LEVEL) if gap.only_held_out else chance
     if stands:
         stands = replace(
             stands,
@@ -124,7 +125,7 @@ def conclude(base: Base, gap: Gap, choice: Choice | None) -> Diagnosis:
         probability = with_one_run(probability, alone.by, alone.sure)
     named = choice if said in (Verdict.NAMED, Verdict.AMBIGUOUS) else None
     held = stands.held_out if named and stands else None
-    left = missing(choice.after if choice else gap)
+    left = missing(named.after if named else gap)
     undecided = named if said == Verdict.AMBIGUOUS else None
     once = bool(stands and stands.once)
     sets = _alternatives(undecided, once, alone) if undecided else []
@@ -394,9 +395,9 @@ def _moment(base: Base, gap: Gap, choice: Choice | None) -> tuple[Moment | None,
 
 
 def _alternatives(choice: Choice, once: bool, alone: InOneRun | None) -> list[list[str]]:
-    """For every effect, the names that could stand in its place, itself first.
+    """For every effect, the keys that could stand in its place, itself first.
 
-    Effects that only go together, on either side, are one name.
+    Effects that only go together, on either side, are one key.
 
     Args:
       once: whether something that happened once fits about as well.
@@ -417,8 +418,8 @@ def _alternatives(choice: Choice, once: bool, alone: InOneRun | None) -> list[li
 
 
 def _joined(starts: Sequence[Start]) -> str:
-    """Names of effects as in `Diagnosis.alternatives`: several joined by "+", or none."""
-    return "+".join(s.effect.name for s in starts) or NONE
+    """Keys of effects as in `Diagnosis.alternatives`: several joined by "+", or none."""
+    return "+".join(s.effect.key for s in starts) or NONE
 
 
 def _shown(parameter: Parameter, value: float) -> float:
@@ -504,6 +505,7 @@ def _summary(base: Base, gap: Gap, choice: Choice | None, unforeseen: float) -> 
         after=over_noise(slow_part(choice.fitted.system, windows)[0], dof) if choice else None,
         scope=f"{who}: rms of the whitened residual below {BAND:g} Hz",
         p_value=gap.p,
+        only_held_out=gap.only_held_out,
         p_value_after=choice.after.p if choice else None,
         unforeseen=unforeseen if is_held else None,
         shows_after=choice is not None and choice.after.exists,

@@ -58,7 +58,7 @@ def notes_on(
             "the floor is looked for, such as a surface_patch ([trial.initial] gives a position)"
         )
     for channel, noise in base.bench.noise.items():
-        given = study.noise.get(channel)
+        given = study.noise_given(channel)
         if given is not None and not 1.0 / NEAR < noise.total / given < NEAR:
             notes.append(
                 f"noise of {channel}: {noise.total:.3g} (SI) is left by the best fit, and not the "

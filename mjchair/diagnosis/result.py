@@ -24,7 +24,7 @@ from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.diagnosis.next_experiment.design import Plan
 from mjchair.diagnosis.replay.pulses import Force
-from mjchair.diagnosis.rules import Verdict
+from mjchair.diagnosis.rules import LEVEL, Verdict
 
 Array = NDArray[np.float64]
 
@@ -122,8 +122,9 @@ class GapSummary:
     `after` is what the corrected chair leaves, None where there is none. `unforeseen` is what is
     left, by the corrected chair where there is one, without what the fitted trials leave open of
     the numbers that are only roughly known; None where no trial is held out. `p_value` and
-    `p_value_after` are of all tests together, on the trials that were fitted to; `shows_after` says
-    whether a gap shows in what is left, which asks for a single test that stands out as well.
+    `p_value_after` are of all tests together, on the trials that were fitted to; `only_held_out`
+    says that no gap shows there, and one does on the held-out trials. `shows_after` says whether a
+    gap shows in what is left, which asks for a single test that stands out as well.
     """
 
     before: float
@@ -133,12 +134,18 @@ class GapSummary:
     p_value_after: float | None
     unforeseen: float | None = None
     shows_after: bool = False
+    only_held_out: bool = False
     noise_floor: float = 1.0
 
     @property
     def held_out(self) -> bool:
         """Whether these trials are ones that no fit saw."""
         return "held-out" in self.scope
+
+    @property
+    def shows(self) -> bool:
+        """Whether more than noise is left by the chair as it was."""
+        return self.p_value < LEVEL or self.only_held_out
 
 
 @dataclass(frozen=True)
@@ -387,9 +394,10 @@ class Diagnosis:
 
     Attributes:
       verdict: what is said. effects: in the model now, most important first.
-      alternatives: sets of effects that these data cannot tell apart, one set for each effect,
-        itself first; "a+b" is two that go together, "none" that nothing stands there, "event"
-        that something happened once, and "one_run" that something acts in one run alone.
+      alternatives: keys of effects that these data cannot tell apart, one set for each effect,
+        itself first; that of a sensor's error ends in its channel, "a+b" is two that go together,
+        "none" that nothing stands there, "event" that something happened once, and "one_run" that
+        something acts in one run alone.
       candidates: every effect as screened. gap: rms of the whitened residual before and after.
       where: where the disagreement is. next_experiment: what would decide.
       notes: what was assumed or noticed. drivers: what the force that is missing goes with.

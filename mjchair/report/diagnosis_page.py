@@ -19,7 +19,7 @@ import matplotlib
 from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
-from mjchair.diagnosis.next_experiment.wording import plain, roughly_known
+from mjchair.diagnosis.next_experiment.wording import plain, plain_together, roughly_known
 from mjchair.diagnosis.result import Candidate, Diagnosis
 from mjchair.effects.library import find
 from mjchair.errors import MjchairError
@@ -286,7 +286,10 @@ def _experiments(diagnosis: Diagnosis) -> Table:
     plan = diagnosis.evidence.plan if diagnosis.evidence else None
     if plan is None:
         return Table()
-    heads = [Head("manoeuvre"), *(Head(f"from {plain(r)} (sigma)", True) for r in plan.rivals)]
+    heads = [
+        Head("manoeuvre"),
+        *(Head(f"from {plain_together(r)} (sigma)", True) for r in plan.rivals),
+    ]
     rows = [
         Row([e.manoeuvre.name, *(f"{t**0.5:.1f}" for t in e.separations)], chosen=k == 0)
         for k, e in enumerate(plan.experiments[:EXPERIMENTS])

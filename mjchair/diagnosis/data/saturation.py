@@ -34,25 +34,24 @@ def _of_run(trial: Trial, torque_measured: bool) -> list[str]:
     for name, values in columns.items():
         if values.size and values[0] != 0.0 and not np.ptp(values):
             out.append(f"{trial.name}: {name} is exactly {values[0]:.4g} throughout; was it stuck?")
-        for end in _ends(values):
+        for which, end in _ends(values).items():
             share = float(np.mean(values == end))
             out.append(
-                f"{trial.name}: {per_cent(share)} of {name} is exactly {end:.4g}, its "
-                f"{'largest' if end > 0.0 else 'least'} value; was the sensor at its end? What it "
-                "did not see is missing in every answer"
+                f"{trial.name}: {per_cent(share)} of {name} is exactly {end:.4g}, its {which} "
+                "value; was the sensor at its end? What it did not see is missing in every answer"
             )
     return out
 
 
-def _ends(values: Array) -> list[float]:
+def _ends(values: Array) -> dict[str, float]:
     """The largest and the least value, where they pile up; 0 is no sensor's end."""
     seen, counts = np.unique(values, return_counts=True)
     if seen.size < VALUES:
-        return []
+        return {}
     enough = max(SHARE * values.size, PILE * float(np.median(counts)))
-    ends = ((-1, -2), (0, 1))  # the largest and the least value, and those next to them
-    return [
-        float(seen[end])
-        for end, beside in ends
+    ends = {"largest": (-1, -2), "least": (0, 1)}  # and the values next to them
+    return {
+        which: float(seen[end])
+        for which, (end, beside) in ends.items()
         if seen[end] != 0.0 and counts[end] > max(enough, PILE * counts[beside])
-    ]
+    }

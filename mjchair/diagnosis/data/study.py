@@ -95,6 +95,10 @@ class Study:
         measured = {c for run in self.runs for c in run.trial.channels}
         return tuple(sorted(measured))
 
+    def noise_given(self, channel: str) -> float | None:
+        """Noise (SI) that is known of a channel, or of the sensor that it belongs to."""
+        return self.noise.get(channel, self.noise.get(channel.rsplit(".", 1)[0]))
+
     @property
     def driven_as_measured(self) -> bool:
         """Whether the torques of rear wheels were measured, and drive a run."""

@@ -150,8 +150,8 @@ def read_study(folder: str | os.PathLike[str]) -> Study:
     _check_choice("rider is", entry.rider, RIDERS, path)
     spec = _spec(entry, path)
     model = spec.copy().compile()
-    runs = _runs(entry, path, model)
-    notes = _unmeasured(noise, runs, model, path)
+    runs, renamed = _runs(entry, path, model)
+    notes = _unmeasured(noise, runs, model, path) + renamed
     study = make_study(spec, runs, noise, entry.nuisance, notes, str(path.parent))
     known = replace(
         study,
@@ -252,8 +252,9 @@ def _spec(entry: StudyEntry, path: Path) -> mujoco.MjSpec:
     )
 
 
-def _runs(entry: StudyEntry, path: Path, model: mujoco.MjModel) -> list[Run]:
-    runs: list[Run] = []
+def _runs(entry: StudyEntry, path: Path, model: mujoco.MjModel) -> tuple[list[Run], list[str]]:
+    """The runs, and a note on each that got a number after its name."""
+    runs, renamed = list[Run](), list[str]()
     for told in entry.trial:
         trial = _trial(told, entry, path, model)
         twin = next((r.trial.name for r in runs if _same(trial, r.trial)), None)
@@ -261,12 +262,16 @@ def _runs(entry: StudyEntry, path: Path, model: mujoco.MjModel) -> list[Run]:
             raise MjchairError(
                 f"{path}: trial {trial.name} holds the samples of {twin} again; keep one"
             )
+        own = _own_name(trial.name, [run.trial.name for run in runs])
+        if own != trial.name:
+            renamed.append(f"trial {len(runs) + 1} is called {own}, since another is {trial.name}")
+        trial = replace(trial, name=own)
         given = told.initial.given(trial.name) if told.initial is not None else {}
         unit_checks.check_initial(given, trial.name)
         load = None if told.load is None else Load(**structs.asdict(told.load))
         run = Run(trial, told.manoeuvre, told.hold_out, Initial(**given), frozenset(given), load)
         runs.append(replace(run, torque_estimated=told.torque is not None))
-    return runs
+    return runs, renamed
 
 
 def _trial(told: TrialEntry, entry: StudyEntry, path: Path, model: mujoco.MjModel) -> Trial:
@@ -296,6 +301,15 @@ def _trial(told: TrialEntry, entry: StudyEntry, path: Path, model: mujoco.MjMode
 def _check_choice(what: str, value: str, known: tuple[str, ...], path: Path) -> None:
     if value not in known:
         raise MjchairError(f"{path}: {what} {value!r}" + nearest(value, known))
+
+
+def _own_name(name: str, others: Sequence[str]) -> str:
+    """A name, with a number after it where another run has it: one folder a day is usual."""
+    own, number = name, 1
+    while own in others:
+        number += 1
+        own = f"{name}_{number}"
+    return own
 
 
 def _same(one: Trial, two: Trial) -> bool:

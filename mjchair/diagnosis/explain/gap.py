@@ -70,6 +70,7 @@ class Gap:
 
     Attributes:
       tests: largest first. p: of the family. exists: whether there is a gap worth naming.
+      only_held_out: whether it shows on held-out trials alone, of which `p` knows nothing.
       excess: chi2 of the slow part above what noise gives. excess_std: its standard deviation.
       drawn: (draws,) the least p of the effect and force tests where there is no gap.
     """
@@ -79,6 +80,7 @@ class Gap:
     exists: bool
     excess: float
     excess_std: float
+    only_held_out: bool = False
     drawn: Array = field(default_factory=lambda: np.ones(DRAWS))
 
     @property

@@ -258,7 +258,9 @@ def plain_gap(base: Base) -> Gap:
     What is only roughly known may take an effect for itself, and then foretells wrongly.
     """
     gap = confirmed(base, base.plain, gap_after(base, base.plain))
-    return replace(gap, exists=True) if held_out_shows(base) else gap
+    if gap.exists or not held_out_shows(base):
+        return gap
+    return replace(gap, exists=True, only_held_out=True)
 
 
 def held_out_shows(base: Base) -> bool:

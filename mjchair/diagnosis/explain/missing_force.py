@@ -8,6 +8,7 @@ have.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -124,7 +125,7 @@ def driver_columns(
             run = bench.simulator.windows[pulse.window].run
             trial = bench.simulator.study.runs[run].trial.name
             group = ForceGroup(force, Driver(Quantity.TIME, trial))
-            add_answer(out, bench, ForceColumn(group, int(pulse.time)), pulse, answer)
+            add_answer(out, bench, ForceColumn(group, math.floor(pulse.time)), pulse, answer)
     return out
 
 

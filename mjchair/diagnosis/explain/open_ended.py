@@ -43,8 +43,10 @@ def with_least_sizes(base: Base, fitted: Fitted) -> Fitted:
 
 
 def _far(term: Term, p: Parameter) -> float | None:
-    """A far larger size, within bounds; None: they leave none."""
+    """A far larger size, within bounds; None: they leave none, or there is no size."""
     size = term.values[p.name] - p.neutral
+    if size == 0.0:  # of two sides one may end so
+        return None
     far = min(max(p.neutral + FURTHER * size, p.low), p.high)
     return None if abs(far - p.neutral) < LEAST * abs(size) else far
 

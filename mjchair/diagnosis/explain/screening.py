@@ -14,6 +14,7 @@ import numpy as np
 
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.data import first_state, roughly_known
+from mjchair.diagnosis.data.standstill import ROCKS
 from mjchair.diagnosis.data.study import Study, with_copied_wheels
 from mjchair.diagnosis.data.windows import calm, shimmying
 from mjchair.diagnosis.explain import (
@@ -120,19 +121,42 @@ def prepare(
     study: Study, say: Say = silent, store: Store | None = None, threads: int = 0
 ) -> tuple[Bench, Track]:
     """Windows, their states, the noise, and what is only roughly known."""
-    study = with_copied_wheels(study)
-    simulator = WindowSimulator(study, store=store, threads=threads)
+    simulator = _of_windows(with_copied_wheels(study), store, threads)
+    study = simulator.study
     known = noise.estimate(study)
     say("states along the runs")
     first = track(simulator, simulator.base, known)
     given = dict(study.nuisance)
     # at rest the accelerometer showed its bias
-    if any(first_state.stops(run) for run in study.runs):
+    stops = any(first_state.stops(run) for run in study.runs)
+    if stops and "bias:imu_accelerometer" not in given:
         given.setdefault("bias:imu_accelerometer.x", AT_REST)
     nuisances = roughly_known.nuisances(study.channels, given, study.driven_as_measured)
     noises = noise_left.refined(simulator, first, known)
     tips = tipping.tipped(simulator, first)
     return Bench(simulator, noises, nuisances, tipped=tips), first
+
+
+def _of_windows(study: Study, store: Store | None, threads: int) -> WindowSimulator:
+    """A simulator of the runs that have a window; a note says which have none.
+
+    Raises:
+      MjchairError: no run that is fitted to has one.
+    """
+    simulator = WindowSimulator(study, store=store, threads=threads)
+    used = {w.run for w in simulator.windows}
+    if len(used) == len(study.runs):
+        return simulator
+    left = tuple(run for i, run in enumerate(study.runs) if i in used)
+    names = ", ".join(run.trial.name for i, run in enumerate(study.runs) if i not in used)
+    said = (
+        f"{names}: too few samples are left beside the start, the stops and the end (a stand tells "
+        f"something after {ROCKS:g} s)"
+    )
+    if all(run.hold_out for run in left):
+        raise MjchairError(f"{study.source}: {said}; no other trial is left to fit to")
+    known = replace(study, runs=left, notes=(*study.notes, f"{said}; left out"))
+    return WindowSimulator(known, store=store, threads=threads)
 
 
 def screen_columns(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mjchair.diagnosis.data import first_state
 from mjchair.diagnosis.data.study import Study
 from mjchair.model.load import Load
+from mjchair.model.wheels import WHEELS
 from mjchair.simulation.initial import Initial
 from mjchair.simulation.inputs import Inputs
 
@@ -107,17 +108,20 @@ class Setting:
 def setting(study: Study) -> Setting:
     """That of the first coast that is fitted to, or else of the first run."""
     runs = [study.runs[i] for i in study.fitted]
-    coast = next((r for r in runs if r.trial.inputs is None), runs[0])
+    peaks = [0.0 if r.trial.inputs is None else _peak(r.trial.inputs) for r in runs]
+    driven = [peak for peak in peaks if peak > 0.0]
+    coast = next((r for r, peak in zip(runs, peaks, strict=True) if peak == 0.0), runs[0])
     first = first_state.initial(coast, study.axle)
-    driven = [r.trial.inputs for r in runs if r.trial.inputs is not None]
-    torque = float(np.median([_peak(inputs) for inputs in driven] or [0.0]))
+    torque = float(np.median(driven or [0.0]))
     place = first.position or (0.0, 0.0)
     heading, straight = first.heading or 0.0, bool(study.copied)
     return Setting(place, heading, torque, coast.trial.name, straight, study.torque_measured)
 
 
 def _peak(inputs: Inputs) -> float:
-    return max(float(np.nanmax(np.abs(v))) for v in inputs.controls.values())
+    """Largest torque of a rear wheel, N m; 0 where none is told: a joystick gives shares."""
+    torques = [v for name, v in inputs.controls.items() if name.endswith(WHEELS[:2])]
+    return max((float(np.nanmax(np.abs(v))) for v in torques), default=0.0)
 
 
 def possible(here: Setting) -> list[Manoeuvre]:

@@ -30,7 +30,8 @@ def deciding(plan: Plan, simulator: WindowSimulator) -> str:
     said = [_what_to_do(plan)]
     pairs = zip(plan.chosen, plan.rivals, best.separations, plan.evidence, strict=True)
     for chosen, rival, t, evidence in pairs:
-        said.append(f"It separates {plain(chosen)} from {plain(rival)} by {_sigmas(t)}.")
+        one, other = plain_together(chosen), plain_together(rival)
+        said.append(f"It separates {one} from {other} by {_sigmas(t)}.")
         if evidence is not None and evidence.noises > 1.0:
             said.append(_evidence(evidence, chosen, rival, units[evidence.channel]))
     said += _again(plan)
@@ -63,6 +64,11 @@ def plain(key: str) -> str:
     return name.replace("_", " ") + (f" of {channel}" if channel else "")
 
 
+def plain_together(keys: str) -> str:
+    """Keys of effects that `distinct` joined, as words."""
+    return " and ".join(map(plain, keys.split(" and ")))
+
+
 def _sigmas(t: float) -> str:
     size = math.sqrt(t)
     return f"more than {MOST:g} sigmas" if size > MOST else f"about {size:.2g} sigmas"
@@ -73,8 +79,9 @@ def _evidence(evidence: Evidence, chosen: str, rival: str, unit: str) -> str:
     unit = "" if unit in ("1", "?") else f" {unit}"
     return (
         f"Look at {evidence.channel}: {evidence.time:.1f} s after the start it is "
-        f"{abs(by):.2g}{unit} {'higher' if by > 0.0 else 'lower'} if it is {plain(rival)} "
-        f"({evidence.rival:.3g}{unit}) than if it is {plain(chosen)} ({evidence.chosen:.3g}{unit})."
+        f"{abs(by):.2g}{unit} {'higher' if by > 0.0 else 'lower'} if it is "
+        f"{plain_together(rival)} ({evidence.rival:.3g}{unit}) than if it is "
+        f"{plain_together(chosen)} ({evidence.chosen:.3g}{unit})."
     )
 
 

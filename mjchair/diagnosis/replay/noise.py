@@ -93,7 +93,7 @@ def _channel(study: Study, channel: str) -> Noise:
     rounding = max((_lattice(v) for v in values), default=0.0)
     white = _white(values)
     least = max(sensor(channel).floor, rounding / np.sqrt(12.0))
-    given = study.noise.get(channel, study.noise.get(channel.rsplit(".", 1)[0]))
+    given = study.noise_given(channel)
     # at rest an encoder stays on one tick, which tells nothing of a wheel that turns
     still = None if sensor(channel).free_zero else _still(study, channel)
     slow, time, source = rounding / np.sqrt(12.0), _held(values, step), "third differences"

@@ -12,7 +12,7 @@ from mjchair.diagnosis.explain.probability import ONE_RUN, of_effects
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.next_experiment.wording import MEASURED, measured, plain
 from mjchair.diagnosis.result import Diagnosis, GapSummary, Moment, NamedEffect, Nearest, OneRun
-from mjchair.diagnosis.rules import LEVEL, LIKELY, PROBABLE, Verdict
+from mjchair.diagnosis.rules import LIKELY, PROBABLE, Verdict
 from mjchair.report.diagnosis_words.explanations import (
     Explanation,
     explanations,
@@ -151,8 +151,9 @@ def _open(diagnosis: Diagnosis, effects: Sequence[NamedEffect]) -> str:
     ((own, others),) = sets.items()
     likely = of_effects(diagnosis.probability, [e.key for e in effects])
     if likely >= CLEARLY:
-        first = f"it is probably {together(own)} ({share(likely)})"
-        return f"{first}, but these runs do not rule out {one_of(*others)}. {capital(chair)}"
+        first = f"it is probably {together(own)} ({probable(likely)})"
+        other = "that nothing stands there" if others == [NONE] else one_of(*others)
+        return f"{first}, but these runs do not rule out {other}. {capital(chair)}"
     any_of = one_of(own, *others)
     return f"it is {any_of}, and these runs cannot tell which. {capital(chair)}"
 
@@ -170,16 +171,18 @@ def nothing_missing(diagnosis: Diagnosis) -> str:
     gap, material = diagnosis.gap, diagnosis.material
     far = ", if chair and sensors are as far from what the study says as these runs put them"
     far = far if diagnosis.next_experiment else ""
-    if gap is None or gap.p_value >= LEVEL or material is None:
+    if gap is None or not gap.shows or material is None:
         return f"Nothing{far}: the chair explains these runs as well as the noise in them allows."
     if material.value >= material.limit:
         return (
             f"Nothing that matters{far}: single tests stand out that no effect explains, but all "
             f"that is left together is no more than noise{_held_out_left(gap)}."
         )
+    where = " in the runs held out" if gap.only_held_out else ""
     return (
-        f"Nothing that matters{far}: more than noise is left, but no missing force is larger than "
-        f"{material.value:.2g} N, and below {material.limit:.2g} N none matters, whatever makes it."
+        f"Nothing that matters{far}: more than noise is left{where}, but no missing force is "
+        f"larger than {material.value:.2g} N, and below {material.limit:.2g} N none matters, "
+        "whatever makes it."
     )
 
 
@@ -259,7 +262,7 @@ def _held_out(diagnosis: Diagnosis) -> str:
         return " in the runs of the fit; those held out show none"
     if gap.after > STAYS * gap.before:
         return f" in the runs of the fit; those held out stay at {gap.after:.1f} times the noise"
-    fell = f"from {gap.before:.1f} to {gap.after:.1f} times the noise"
+    fell = f"from {gap.before:.2f} to {gap.after:.2f} times the noise"
     return f" in the runs of the fit; in those held out it falls {fell}"
 
 
@@ -328,6 +331,11 @@ def _then(diagnosis: Diagnosis) -> str:
             if diagnosis.shaken is not None:
                 return f"Look at what was different in {diagnosis.shaken.trial}, and repeat it."
             return "Nothing is needed; use the chair as it is."
+        if diagnosis.verdict == Verdict.AMBIGUOUS:
+            return (
+                "These data do not decide, and no experiment could be planned that does: repeat "
+                "the runs in which the gap is largest, and look at the notes."
+            )
         if diagnosis.effects and not any(e.of_chair for e in diagnosis.effects):
             chair = "" if diagnosis.more_missing else "; the chair lacks nothing"
             sensor = all(e.channel is not None for e in diagnosis.effects)

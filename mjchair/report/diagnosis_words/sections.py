@@ -78,8 +78,13 @@ def other_runs(diagnosis: Diagnosis) -> str:
 def gap_words(diagnosis: Diagnosis) -> str:
     """Whether there is a gap, with the test's result."""
     p = diagnosis.gap.p_value if diagnosis.gap else 1.0
-    exists = "It is more than noise."
-    if diagnosis.verdict == Verdict.NONE:
+    held_out = diagnosis.gap is not None and diagnosis.gap.only_held_out
+    exists = (
+        "Nothing shows there, but the chair foretells the held-out runs worse than noise does."
+        if held_out
+        else "It is more than noise."
+    )
+    if diagnosis.verdict == Verdict.NONE and not held_out:
         small = diagnosis.material is None or diagnosis.material.value < diagnosis.material.limit
         matters = "and too small to matter" if small else "but all that is left together is not"
         exists = "Nothing shows." if p >= LEVEL else f"It is more than noise, {matters}."
@@ -112,8 +117,7 @@ def alike_words(diagnosis: Diagnosis) -> str:
 def choice_words(diagnosis: Diagnosis) -> str:
     """Why this effect, or why none."""
     if diagnosis.verdict == Verdict.NONE:
-        gap = diagnosis.gap
-        if gap is None or gap.p_value >= LEVEL:
+        if diagnosis.gap is None or not diagnosis.gap.shows:
             return "None is named, since there is no gap to explain."
         return "None is named, since what is left does not matter (section 1)."
     if diagnosis.verdict == Verdict.NAMED:
