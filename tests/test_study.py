@@ -375,11 +375,14 @@ def test_what_is_known_of_the_first_sample_may_have_units(tmp_path):
     assert run.given == {"heading", "speed", "yaw_rate"}
 
 
-def test_one_torque_column_stays_one_where_a_turn_was_measured(tmp_path):
+def test_one_torque_column_stands_for_both_where_the_chair_goes_straight(tmp_path):
     columns = wheels() | {"left_wheel": np.full(TIME.size, 3.0)}
     study = mjchair.read_study(write(tmp_path, columns, EAST))
-    assert set(study.runs[0].trial.inputs.controls) == {"left_wheel"}
-    assert study.notes == ("a: no torque column of the right wheel; it is not driven",)
+    assert set(study.runs[0].trial.inputs.controls) == {"left_wheel", "right_wheel"}
+    assert study.notes == (
+        "a: no torque column of the right wheel; it is assumed to be driven alike, since the chair "
+        "turns with 0 % of what the left one alone would do",
+    )
 
 
 def test_the_smartwheel_recording_is_a_study():

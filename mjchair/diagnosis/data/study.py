@@ -14,6 +14,7 @@ import mujoco
 from mjchair.diagnosis.data import (
     mass_checks,
     motion_checks,
+    one_torque,
     sign_checks,
     standstill,
     trial_checks,
@@ -271,4 +272,5 @@ def _checked(trial: Trial, axle: RearAxle, mass: float) -> tuple[Trial, list[str
         said += noticed
     trial_checks.check(trial)
     unit_checks.check(trial, axle)
-    return trial, said + sign_checks.check(trial, axle, mass)
+    trial, noticed = one_torque.shared(trial, axle, mass)
+    return trial, said + noticed + sign_checks.check(trial, axle, mass)

@@ -253,14 +253,14 @@ def with_copied_wheel(trial: Trial) -> Trial:
     return replace(trial, channels=MappingProxyType({**trial.channels, **more}))
 
 
-def _driven(trial: Trial) -> list[str]:
+def driven_sides(trial: Trial) -> list[str]:
     """The sides whose wheel has a torque."""
     return [s for s in SIDES if trial.inputs is not None and f"{s}_wheel" in trial.inputs.controls]
 
 
 def _driven_alike(trial: Trial) -> bool:
     """Whether nothing says that the two wheels are driven unlike: one torque stands for both."""
-    if trial.inputs is None or len(_driven(trial)) < 2:
+    if trial.inputs is None or len(driven_sides(trial)) < 2:
         return True
     left, right = (trial.inputs.at(f"{side}_wheel", trial.time) for side in SIDES)
     unlike, common = (np.sqrt(np.mean(np.square(t))) for t in (left - right, 0.5 * (left + right)))
@@ -271,15 +271,11 @@ def other_side(trial: Trial) -> tuple[Trial, list[str]]:
     """The run with the wheel that was not measured taken to be like the other one, and a note.
 
     Where nothing tells how the chair turns, one instrumented wheel stands for both, unless both
-    are driven and not alike. Where the other wheel or a turn was measured, a wheel without a torque
-    column is not driven.
+    are driven and not alike. Where the other wheel or a turn was measured, that tells (one_torque).
     """
-    driven, seen = _driven(trial), _sides_seen(trial.channels)
+    driven, seen = driven_sides(trial), _sides_seen(trial.channels)
     if tells_turning(trial.channels):
-        if len(driven) != 1:
-            return trial, []
-        other = SIDES[driven[0]]
-        return trial, [f"{trial.name}: no torque column of the {other} wheel; it is not driven"]
+        return trial, []
     if len(seen) != 1 and len(driven) != 1:
         return trial, []
     side = seen[0] if len(driven) == 2 else (driven or seen)[0]
