@@ -18,6 +18,7 @@ from typing import Any
 import mjchair
 from mjchair import cli
 from mjchair.commands import completion
+from mjchair.effects.effect import Effect
 from mjchair.effects.library import MECHANICAL, SENSORS, find
 from mjchair.model import assets
 from mjchair.model.spec import drive_file
@@ -130,12 +131,13 @@ def effects_page() -> str:
         "# Effects\n",
         "`mjchair hide NAME` puts one into a chair, `mjchair diagnose` looks for all. An effect of "
         "a sensor is named with its channel, as `sensor_bias:imu_gyro.z`. "
-        + "`weak_motor`, `low_battery` and `dragging_brake` are of chairs with a drive.\n",
+        "The numbers of the sensors' effects are those for `imu_gyro.z`. The second form of "
+        "`wheel_radius` is that of a frame that twists, so that all wheels keep their loads. "
+        "`weak_motor`, `low_battery` and `dragging_brake` are of chairs with a drive.\n",
     ]
     for effect in (*MECHANICAL, *(find(name, EXAMPLE) for name in SENSORS)):
         known = f"## {effect.name}\n" in told
-        form = f"### where `{effect.measured}` is a column\n"
-        told.append(form if known else f"## {effect.name}\n")
+        told.append(_form(effect) if known else f"## {effect.name}\n")
         told.append(f"{_text(effect.signature)}.\n")
         told += [
             "| parameter | unit | usual size | from | to | none at |",
@@ -147,6 +149,15 @@ def effects_page() -> str:
         ]
         told.append(f"\nSource: {_text(effect.source)}.\n")
     return "\n".join(told)
+
+
+def _form(effect: Effect) -> str:
+    """Heading of another form of an effect."""
+    if effect.measured is None:
+        return "### Another form of the same effect\n"
+    if effect.measured.startswith("stroke_"):
+        return "### In step with the strokes, where nobody measured the motion\n"
+    return f"### Where `{effect.measured}` is a column of the tables\n"
 
 
 def channels_page() -> str:
