@@ -24,9 +24,11 @@ from mjchair.diagnosis.replay.cache import Store
 from mjchair.diagnosis.result import Diagnosis
 from mjchair.effects.effect import Effect
 from mjchair.effects.library import library
+from mjchair.effects.torque_gain import EFFECT as TORQUE_GAIN
 from mjchair.model.engine_warnings import without_engine_warnings
 
-# times as common as others: who writes an effect has a reason to suspect it (assumption)
+# times as common as others: who writes an effect has a reason to suspect it, and no two hands push
+# alike where the torque of one was measured for both (assumptions)
 SUSPECTED = 8.0
 
 
@@ -45,7 +47,15 @@ def study_effects(study: Study, more: Sequence[Effect] = ()) -> list[Effect]:
     ]
     wrong = mistaken(study.channels, study.nuisance, study.driven_as_measured)
     suspected = (replace(effect, common=SUSPECTED * effect.common) for effect in more)
+    if any(run.torque_assumed for run in study.runs):
+        possible = [_of_two_hands(effect) for effect in possible]
     return [*(_rarer(effect, wrong) for effect in possible), *suspected]
+
+
+def _of_two_hands(effect: Effect) -> Effect:
+    """The effect, more common where it says that the two torques are not alike."""
+    doubted = effect.key == TORQUE_GAIN.key
+    return replace(effect, common=SUSPECTED * effect.common) if doubted else effect
 
 
 def _rarer(effect: Effect, wrong: Mapping[str, float]) -> Effect:

@@ -20,6 +20,7 @@ from mjchair.diagnosis.data import (
     trial_checks,
     unit_checks,
 )
+from mjchair.diagnosis.data.trial_checks import driven_sides
 from mjchair.errors import MjchairError
 from mjchair.measurement.lost_samples import without_lost
 from mjchair.measurement.trial import Trial, check_columns
@@ -40,7 +41,8 @@ class Run:
       hold_out: kept for the final check. initial: what is known of the first sample; fields that
         were not given are estimated. given: names of the fields that were given.
       load: that was strapped to the chair for this run; None: none.
-      torque_estimated: whether its torques were made from its motion.
+      torque_estimated: whether its torques were made from its motion. torque_assumed: whether the
+        torque of one wheel was measured, and stands for both.
     """
 
     trial: Trial
@@ -50,6 +52,7 @@ class Run:
     given: frozenset[str]
     load: Load | None = None
     torque_estimated: bool = False
+    torque_assumed: bool = False
 
     @property
     def duration(self) -> float:
@@ -154,7 +157,8 @@ def make_study(
         trial, noticed = _checked(run.trial, axle, mass)
         if "speed" in run.given:
             unit_checks.check_first_speed(trial, axle, run.initial.speed)
-        checked.append(replace(run, trial=trial))
+        assumed = len(driven_sides(trial)) > len(driven_sides(run.trial))
+        checked.append(replace(run, trial=trial, torque_assumed=assumed))
         said += noticed
     said += _weighed(checked, axle, mass)
     said += _without_heading(checked) + _coming_to_rest(checked)
