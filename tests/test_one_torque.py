@@ -8,6 +8,7 @@ import pytest
 import mjchair
 from mjchair.diagnosis.data.study import Run, make_study
 from mjchair.diagnosis.diagnose import study_effects
+from mjchair.measurement import samples
 from mjchair.measurement.trial import Trial
 from mjchair.simulation.initial import Initial
 from mjchair.simulation.inputs import Inputs
@@ -63,6 +64,12 @@ def test_the_turn_tells_whether_both_wheels_were_driven(
     assert not alike or np.array_equal(controls["left_wheel"], controls["right_wheel"])
 
 
+def test_a_chair_that_is_turned_by_both_hands_asks_for_the_other_torque():
+    made = study("manual", "one torque", "left", -1.0, GYRO)
+    assert set(made.runs[0].trial.inputs.controls) == {"left_wheel"}
+    assert made.notes[0].endswith("If it was pushed the other way, add its torque")
+
+
 def test_a_torque_that_was_measured_of_one_wheel_alone_is_doubted_for_the_other():
     """A right hand that pushed 7 % less came as a centre of mass 11 mm aside."""
     common = {
@@ -71,6 +78,9 @@ def test_a_torque_that_was_measured_of_one_wheel_alone_is_doubted_for_the_other(
         }
         for other in (1.0, 0.0)
     }
+    shipped = mjchair.read_study(samples.folder() / "smartwheel")  # nothing tells of a turn there
+    straight = {e.key: e.common for e in study_effects(shipped)}
+    assert straight["torque_gain"] == common[0.0]["torque_gain"]
     assert common[1.0]["torque_gain"] > 4.0 * common[0.0]["torque_gain"]
     assert common[1.0]["mass_offset"] == common[0.0]["mass_offset"]
 

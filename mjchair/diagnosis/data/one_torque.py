@@ -23,6 +23,7 @@ from mjchair.units import per_cent
 # 1.1 are seen of simulated chairs with one wheel driven, and 0.3 to 0.4 where the other has 0.6 of
 # the torque
 ALONE = 0.5
+OTHERWISE = 1.5  # of it, above which the other wheel turned the chair as well
 TOLD = 0.15  # standard error of that share, up to which it is believed
 FEW = 8  # intervals, of which less tells no course
 
@@ -42,6 +43,8 @@ def shared(trial: Trial, axle: RearAxle, mass: float) -> tuple[Trial, list[str]]
     if turn is None:
         return trial, [f"{said}is not driven. If it was, add its torque"]
     seen = f"the chair turns with {per_cent(max(turn, 0.0))} of what the {side} one alone would do"
+    if turn > OTHERWISE:
+        seen += ". If it was pushed the other way, add its torque"
     if abs(turn) >= ALONE:
         return trial, [f"{said}is not driven, since {seen}"]
     assert trial.inputs is not None

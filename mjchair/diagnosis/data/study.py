@@ -20,7 +20,7 @@ from mjchair.diagnosis.data import (
     trial_checks,
     unit_checks,
 )
-from mjchair.diagnosis.data.trial_checks import driven_sides
+from mjchair.diagnosis.data.trial_checks import driven_sides, tells_turning
 from mjchair.errors import MjchairError
 from mjchair.measurement.lost_samples import without_lost
 from mjchair.measurement.trial import Trial, check_columns
@@ -42,7 +42,7 @@ class Run:
         were not given are estimated. given: names of the fields that were given.
       load: that was strapped to the chair for this run; None: none.
       torque_estimated: whether its torques were made from its motion. torque_assumed: whether the
-        torque of one wheel was measured, and stands for both.
+        torque of one wheel was measured, and by a measured turn stands for both.
     """
 
     trial: Trial
@@ -157,7 +157,8 @@ def make_study(
         trial, noticed = _checked(run.trial, axle, mass)
         if "speed" in run.given:
             unit_checks.check_first_speed(trial, axle, run.initial.speed)
-        assumed = len(driven_sides(trial)) > len(driven_sides(run.trial))
+        more = len(driven_sides(trial)) > len(driven_sides(run.trial))
+        assumed = more and tells_turning(trial.channels)
         checked.append(replace(run, trial=trial, torque_assumed=assumed))
         said += noticed
     said += _weighed(checked, axle, mass)
