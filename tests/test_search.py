@@ -561,6 +561,22 @@ def test_the_more_common_of_two_effects_comes_first_within_their_form(
     assert best.hypothesis.keys == (("rolling",) if takes else ("motor",))
 
 
+@pytest.mark.parametrize(("behind", "takes"), [(-11.0, True), (1.0, False)])
+def test_one_effect_that_fits_better_than_two_comes_first_though_it_is_rare(
+    behind, takes, monkeypatch
+):
+    """A wind was 11 of chi2 better than a bearing's friction with a slope, which came first.
+
+    It is a tenth as common as others, and both together bring 5000, of which 2 % are the form's.
+    """
+    slope, wind = effect("slope", common=2.0), effect("wind", common=0.1)
+    pair = Tried(Hypothesis((ROLLING, slope), 5000.0, 4980.0), fit(0.0, "rolling", "slope"))
+    alone = Tried(Hypothesis((wind,), 4990.0, 4980.0), fit(behind, "wind"))
+    monkeypatch.setattr(rivals, "believable", lambda _: True)
+    looking = SimpleNamespace(anew=lambda tried: tried.fitted)
+    assert rivals.better_of(looking, pair, [(alone, 5000.0)]) is (alone if takes else None)
+
+
 @pytest.mark.parametrize(("confined", "first"), [(0.0, "shimmy"), (47.0, "rolling")])
 def test_what_fits_for_few_beginnings_of_its_windows_is_no_better(confined, first, monkeypatch):
     """A long relaxation fitted a plain coast by 32 of chi2 better than a rolling resistance."""

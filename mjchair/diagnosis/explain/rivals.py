@@ -67,12 +67,14 @@ def better_of(fits: Fits, chosen: Tried, rivals: Sequence[tuple[Tried, float]]) 
         """Chi2 by which a rival is better: as far as the form of effects lets the data count, and
         by how much more common it is."""
         made = [fits.anew(t) if anew else t.fitted for t in (chosen, rival)]
-        mine, theirs = (
-            fitted.total + fitted.confined + t.hypothesis.cost
-            for t, fitted in zip((chosen, rival), made, strict=True)
-        )
-        more_common = rival.hypothesis.prior - chosen.hypothesis.prior
-        return search_rules.counts(mine - theirs, gain=own) + more_common
+        mine, theirs = (fitted.total + fitted.confined for fitted in made)
+        one, other = chosen.hypothesis, rival.hypothesis
+        more_common = other.prior - one.prior
+        if theirs < mine:  # what fits worse is not first for being simpler
+            fewer = max(len(one.starts) - len(other.starts), 0)
+            more_common += search_rules.TOGETHER * fewer
+        by = mine - theirs + one.cost - other.cost
+        return search_rules.counts(by, gain=own) + more_common
 
     near = [(r, g) for r, g in rivals if believable(r.fitted) and ahead(r, g, False) > -NEAR]
     found = [(ahead(r, g, True), r) for r, g in near]

@@ -28,6 +28,9 @@ from mjchair.diagnosis.rules import (
 Array = NDArray[np.float64]
 # how hypotheses grow and shrink
 MOST = 3  # effects that are added
+# chi2 by which two effects at once are rarer than one of them: 2 ln(0.35 / (0.2 * 2 / 35)), of the
+# priors in probability.py and of 35 effects
+TOGETHER = 6.8
 PENALTY = 10.0  # chi2 that a parameter must bring: log of the number of samples
 WORTH = 15.0  # chi2 that a further effect must bring besides the penalty of its parameters
 LINEAR = 0.1  # share of its gain by which the linear promise of a hypothesis may be wrong
