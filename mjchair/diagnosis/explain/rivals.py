@@ -70,8 +70,8 @@ def better_of(fits: Fits, chosen: Tried, rivals: Sequence[tuple[Tried, float]]) 
         mine, theirs = (fitted.total + fitted.confined for fitted in made)
         one, other = chosen.hypothesis, rival.hypothesis
         more_common = other.prior - one.prior
-        if theirs < mine:  # what fits worse is not first for being simpler
-            fewer = max(len(one.starts) - len(other.starts), 0)
+        fewer = len(one.starts) - len(other.starts)
+        if fewer < 0 or theirs < mine:  # what fits worse is not first for being simpler
             more_common += search_rules.TOGETHER * fewer
         by = mine - theirs + one.cost - other.cost
         return search_rules.counts(by, gain=own) + more_common
