@@ -575,7 +575,7 @@ def test_one_effect_that_fits_better_than_two_comes_first_though_it_is_rare(
     monkeypatch.setattr(rivals, "believable", lambda _: True)
     looking = SimpleNamespace(anew=lambda tried: tried.fitted)
     assert rivals.better_of(looking, pair, [(alone, 5000.0)]) is (alone if takes else None)
-    assert rivals.better_of(looking, alone, [(pair, 5000.0)]) is None
+    assert rivals.better_of(looking, alone, [(pair, 5000.0)]) is (None if takes else pair)
 
 
 @pytest.mark.parametrize(("confined", "first"), [(0.0, "shimmy"), (47.0, "rolling")])

@@ -70,10 +70,12 @@ def better_of(fits: Fits, chosen: Tried, rivals: Sequence[tuple[Tried, float]]) 
         mine, theirs = (fitted.total + fitted.confined for fitted in made)
         one, other = chosen.hypothesis, rival.hypothesis
         more_common = other.prior - one.prior
-        fewer = len(one.starts) - len(other.starts)
-        if fewer < 0 or theirs < mine:  # what fits worse is not first for being simpler
+        fewer, better = len(one.starts) - len(other.starts), mine - theirs
+        if fewer < 0 and better < (0.0 if anew else -NEAR):
+            return -np.inf  # more effects than what fits better
+        if fewer > 0 and better > 0.0:
             more_common += search_rules.TOGETHER * fewer
-        by = mine - theirs + one.cost - other.cost
+        by = better + one.cost - other.cost
         return search_rules.counts(by, gain=own) + more_common
 
     near = [(r, g) for r, g in rivals if believable(r.fitted) and ahead(r, g, False) > -NEAR]
