@@ -7,7 +7,7 @@ import pytest
 
 from mjchair.diagnosis import notes, rules
 from mjchair.diagnosis.explain import search_rules
-from mjchair.diagnosis.result import Estimate
+from mjchair.diagnosis.result import Estimate, GapSummary
 from mjchair.diagnosis.rules import HeldOut, Standing, Verdict
 from mjchair.report.diagnosis_words.first_screen import nothing_missing, turn_words
 
@@ -334,7 +334,7 @@ def test_what_is_below_the_limit_does_not_matter(changes, matters):
 
 def test_the_words_of_none_that_matters_fit_the_force():
     """A force above the limit is not said to be below it."""
-    gap = SimpleNamespace(p_value=1e-6, held_out=False)
+    gap = GapSummary(before=1.5, after=None, scope="", p_value=1e-6, p_value_after=None)
     small, large = (SimpleNamespace(value=v, limit=1.2) for v in (0.4, 3.7))
     below, above = (
         nothing_missing(SimpleNamespace(gap=gap, material=m, next_experiment=""))
@@ -357,14 +357,14 @@ def test_a_force_once_a_turn_that_counts_as_noise_is_told(wheel, drive, said):
 
 
 def test_nothing_is_missing_only_if_the_chair_is_where_the_fit_moved_it():
-    gap = SimpleNamespace(p_value=0.9)
+    gap = GapSummary(before=1.0, after=None, scope="", p_value=0.9, p_value_after=None)
     plain, far = (
         SimpleNamespace(gap=gap, material=None, next_experiment=n)
         for n in ("", "Measure the mass.")
     )
     assert nothing_missing(plain).startswith("Nothing: ")
     assert nothing_missing(far).startswith("Nothing, if chair and sensors are as far ")
-    far.gap, far.material = SimpleNamespace(p_value=1e-6), SimpleNamespace(value=0.4, limit=1.2)
+    far.gap, far.material = replace(gap, p_value=1e-6), SimpleNamespace(value=0.4, limit=1.2)
     assert nothing_missing(far).startswith("Nothing that matters, if chair and sensors are as far ")
 
 
