@@ -115,7 +115,7 @@ def test_the_largest_torque_is_that_of_wheels(controls, torque, run):
 
 
 def test_two_sensors_together_are_worded_as_two():
-    keys = "sensor_scale:left_wheel_speed and wheel_radius"
+    keys = "sensor_scale:left_wheel_speed+wheel_radius"
     words = "sensor scale of left_wheel_speed and wheel radius"
     assert wording.plain_together(keys) == words
 

@@ -8,15 +8,18 @@ alone a chair turns as fast as its own inertia lets it.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from mjchair.diagnosis.data.trial_checks import SIDES, averaged, driven_sides, tells_turning
-from mjchair.diagnosis.data.unit_checks import Story, turning
+from mjchair.diagnosis.data.sign_checks import torque_at
+from mjchair.diagnosis.data.trial_checks import (
+    SIDES,
+    driven_sides,
+    tells_turning,
+    with_torque_on_both,
+)
+from mjchair.diagnosis.data.unit_checks import turning
 from mjchair.measurement.trial import Trial
 from mjchair.model.rolling import RearAxle
-from mjchair.simulation.table import Array
 from mjchair.units import per_cent
 
 # of the turn that the one torque would make alone, below which both wheels were driven: 0.75 to
@@ -47,11 +50,8 @@ def shared(trial: Trial, axle: RearAxle, mass: float) -> tuple[Trial, list[str]]
         seen += ". If it was pushed the other way, add its torque"
     if abs(turn) >= ALONE:
         return trial, [f"{said}is not driven, since {seen}"]
-    assert trial.inputs is not None
-    controls = dict(trial.inputs.controls)
-    controls[f"{SIDES[side]}_wheel"] = controls[f"{side}_wheel"]
-    inputs = replace(trial.inputs, controls=controls)
-    return replace(trial, inputs=inputs), [f"{said}is assumed to be driven alike, since {seen}"]
+    alike = f"{said}is assumed to be driven alike, since {seen}"
+    return with_torque_on_both(trial, side), [alike]
 
 
 def _share(trial: Trial, side: str, axle: RearAxle, mass: float) -> float | None:
@@ -65,28 +65,18 @@ def _share(trial: Trial, side: str, axle: RearAxle, mass: float) -> float | None
     if not stories:
         return None
     rate = stories[0]
-    torque = _torque(trial, side, rate)
+    torque = torque_at(trial.inputs, side, rate.time)
+    if not torque.any():
+        return None
     sign = -1.0 if side == "left" else 1.0
     moved = sign * torque / (axle.radius(side) * 0.5 * axle.track * mass)  # rad/s^2
     steps = np.diff(rate.time)
     columns = [0.5 * (v[1:] + v[:-1]) * steps for v in (moved, rate.values)]
     design, change = np.stack(columns, axis=1), np.diff(rate.values)
-    known = design.T @ design
-    if np.linalg.cond(known) > 1e12:
-        return _of_no_turn(columns[0], change)
-    share, brake = np.linalg.solve(known, design.T @ change)
-    left = change - design @ (share, brake)
-    error = np.sqrt(np.linalg.inv(known)[0, 0] * (left @ left) / (change.size - 2))
-    return float(share) if error < TOLD else None
-
-
-def _of_no_turn(moved: Array, change: Array) -> float | None:
-    """The share where the chair does not turn at all, or nothing drives it."""
-    return 0.0 if np.any(moved) and not np.any(change) else None
-
-
-def _torque(trial: Trial, side: str, rate: Story) -> Array:
-    """Means of the torque (N m) around the times of the turn, (n,)."""
-    assert trial.inputs is not None
-    time, torque = averaged(*trial.inputs.samples(f"{side}_wheel"))
-    return np.asarray(np.interp(rate.time, time, torque))
+    cover = np.linalg.pinv(
+        design.T @ design
+    )  # of a chair that does not turn at all, one column is 0
+    shares = cover @ design.T @ change
+    left = change - design @ shares
+    error = np.sqrt(cover[0, 0] * (left @ left) / (change.size - 2))
+    return float(shares[0]) if error < TOLD else None

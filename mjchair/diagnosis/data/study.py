@@ -6,7 +6,7 @@ what cannot be right is refused in one line.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import mujoco
@@ -183,16 +183,29 @@ def without_estimated_torques(study: Study) -> Study:
     Raises:
       MjchairError: no run is left to fit to.
     """
-    left = tuple(run for run in study.runs if not run.torque_estimated)
-    if len(left) == len(study.runs):
+    return without_runs(
+        study,
+        [run for run in study.runs if run.torque_estimated],
+        'torque = "estimated": the motion of {} made its torque, and cannot contradict it',
+        ": add a coast, or a run with its torque measured",
+    )
+
+
+def without_runs(study: Study, out: Sequence[Run], why: str, advice: str = "") -> Study:
+    """The study without some of its runs, and a note on them.
+
+    Args:
+      why: they are left out, a sentence with {} for their names. advice: where none is left.
+
+    Raises:
+      MjchairError: no run is left to fit to.
+    """
+    if not out:
         return study
-    names = ", ".join(run.trial.name for run in study.runs if run.torque_estimated)
-    said = f'torque = "estimated": the motion of {names} made its torque, and cannot contradict it'
+    left = tuple(run for run in study.runs if not any(run is o for o in out))
+    said = why.format(", ".join(run.trial.name for run in out))
     if all(run.hold_out for run in left):
-        raise MjchairError(
-            f"{study.source}: {said}; no other trial is left to fit to: add a coast, or a run with "
-            "its torque measured"
-        )
+        raise MjchairError(f"{study.source}: {said}; no other trial is left to fit to{advice}")
     return replace(study, runs=left, notes=(*study.notes, f"{said}; left out"))
 
 

@@ -286,7 +286,13 @@ def other_side(trial: Trial) -> tuple[Trial, list[str]]:
     said += "assumed alike, and nothing tells how the chair turns"
     if trial.inputs is None or len(driven) != 1:
         return trial, [said]
-    controls = dict(trial.inputs.controls)
-    controls[f"{SIDES[side]}_wheel"] = controls[f"{side}_wheel"]
-    inputs = replace(trial.inputs, controls=controls)
-    return replace(trial, inputs=inputs), [said]
+    return with_torque_on_both(trial, side), [said]
+
+
+def with_torque_on_both(trial: Trial, side: str) -> Trial:
+    """The run with the torque of one side on both wheels."""
+    assert trial.inputs is not None
+    torque = {f"{SIDES[side]}_wheel": trial.inputs.controls[f"{side}_wheel"]}
+    return replace(
+        trial, inputs=replace(trial.inputs, controls={**trial.inputs.controls, **torque})
+    )

@@ -15,7 +15,7 @@ import numpy as np
 from mjchair.diagnosis import rules
 from mjchair.diagnosis.data import first_state, roughly_known
 from mjchair.diagnosis.data.standstill import ROCKS
-from mjchair.diagnosis.data.study import Study, with_copied_wheels
+from mjchair.diagnosis.data.study import Study, with_copied_wheels, without_runs
 from mjchair.diagnosis.data.windows import calm, shimmying
 from mjchair.diagnosis.explain import (
     candidates,
@@ -145,17 +145,14 @@ def _of_windows(study: Study, store: Store | None, threads: int) -> WindowSimula
     """
     simulator = WindowSimulator(study, store=store, threads=threads)
     used = {w.run for w in simulator.windows}
-    if len(used) == len(study.runs):
-        return simulator
-    left = tuple(run for i, run in enumerate(study.runs) if i in used)
-    names = ", ".join(run.trial.name for i, run in enumerate(study.runs) if i not in used)
-    said = (
-        f"{names}: too few samples are left beside the start, the stops and the end (a stand tells "
-        f"something after {ROCKS:g} s)"
+    empty = [run for i, run in enumerate(study.runs) if i not in used]
+    why = (
+        "{}: too few samples are left once start, stops and end are taken off (of a stand the "
+        f"first {ROCKS:g} s do not count)"
     )
-    if all(run.hold_out for run in left):
-        raise MjchairError(f"{study.source}: {said}; no other trial is left to fit to")
-    known = replace(study, runs=left, notes=(*study.notes, f"{said}; left out"))
+    known = without_runs(study, empty, why)
+    if known is study:
+        return simulator
     return WindowSimulator(known, store=store, threads=threads)
 
 

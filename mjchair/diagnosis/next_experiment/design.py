@@ -204,7 +204,7 @@ def _doubted(
 
 
 def distinct(variant: Variant, other: Variant) -> str:
-    """Names of the effects of a variant that the other does not have."""
+    """Keys of the effects of a variant that the other does not have, joined by "+"."""
     theirs = {t.effect.key for t in other.terms}
     mine = [t.effect.key for t in variant.terms if t.effect.key not in theirs]
-    return " and ".join(mine) or "no further effect"
+    return "+".join(mine) or "no further effect"

@@ -65,8 +65,8 @@ def plain(key: str) -> str:
 
 
 def plain_together(keys: str) -> str:
-    """Keys of effects that `distinct` joined, as words."""
-    return " and ".join(map(plain, keys.split(" and ")))
+    """Keys of effects, joined by "+", as words."""
+    return " and ".join(map(plain, keys.split("+")))
 
 
 def _sigmas(t: float) -> str:

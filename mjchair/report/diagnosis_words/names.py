@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from mjchair.diagnosis.explain.calibration import NONE, OUTSIDE
 from mjchair.diagnosis.explain.event import EVENT
 from mjchair.diagnosis.explain.probability import ONE_RUN
-from mjchair.diagnosis.next_experiment.wording import plain
+from mjchair.diagnosis.next_experiment.wording import plain, plain_together
 from mjchair.diagnosis.result import Estimate, NamedEffect
 from mjchair.units import per_cent, with_error, with_unit
 
@@ -68,7 +68,7 @@ def hypothesis_words(name: str) -> str:
         OUTSIDE: "something outside the library",
         ONE_RUN: "an effect in one run alone",
     }
-    return known.get(name, " and ".join(plain(n) for n in name.split("+")))
+    return known.get(name, plain_together(name))
 
 
 def effect_words(effect: NamedEffect) -> str:

@@ -78,20 +78,26 @@ def other_runs(diagnosis: Diagnosis) -> str:
 def gap_words(diagnosis: Diagnosis) -> str:
     """Whether there is a gap, with the test's result."""
     p = diagnosis.gap.p_value if diagnosis.gap else 1.0
-    held_out = diagnosis.gap is not None and diagnosis.gap.only_held_out
-    exists = (
-        "Nothing shows there, but the chair foretells the held-out runs worse than noise does."
-        if held_out
-        else "It is more than noise."
-    )
-    if diagnosis.verdict == Verdict.NONE and not held_out:
-        small = diagnosis.material is None or diagnosis.material.value < diagnosis.material.limit
-        matters = "and too small to matter" if small else "but all that is left together is not"
-        exists = "Nothing shows." if p >= LEVEL else f"It is more than noise, {matters}."
     return (
         f"All tests together: noise alone makes such a gap with {chance(p)}, at a level of "
-        f"{LEVEL:g}. {exists}"
+        f"{LEVEL:g}. {_what_shows(diagnosis)}"
     )
+
+
+def _what_shows(diagnosis: Diagnosis) -> str:
+    """What the tests of a gap come to, as a sentence."""
+    gap, material = diagnosis.gap, diagnosis.material
+    if gap is not None and gap.only_held_out:
+        return (
+            "Nothing shows there, but the chair foretells the held-out runs worse than noise does."
+        )
+    if diagnosis.verdict != Verdict.NONE:
+        return "It is more than noise."
+    if gap is None or not gap.shows:
+        return "Nothing shows."
+    small = material is None or material.value < material.limit
+    matters = "and too small to matter" if small else "but all that is left together is not"
+    return f"It is more than noise, {matters}."
 
 
 def driver_words(diagnosis: Diagnosis) -> str:
