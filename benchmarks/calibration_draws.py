@@ -442,7 +442,7 @@ def base_of(bed: Bed, y: Sequence[Array]) -> Any:
     """What stands for a screened study."""
     system = bed.system(y)
     runs = [SimpleNamespace(manoeuvre=m, hold_out=False) for m in bed.kept.manoeuvres]
-    simulator = SimpleNamespace(study=SimpleNamespace(runs=runs))
+    simulator = SimpleNamespace(study=SimpleNamespace(runs=runs), stepped=0)
     bench = SimpleNamespace(windows=bed.windows, simulator=simulator)
     reduced = bounded.reduce(system, bed.windows)
     nothing = np.zeros(len(system.columns))
@@ -464,6 +464,7 @@ def base_of(bed: Bed, y: Sequence[Array]) -> Any:
         found=None,
         best=None,
         anew={},
+        patience=1.0,
     )
 
 

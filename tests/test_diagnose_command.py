@@ -229,6 +229,9 @@ def test_bad_arguments_are_one_line_and_nothing_is_written(done, tmp_path, capsy
     with pytest.raises(SystemExit):
         cli.main(["diagnose", str(done[0]), "--out", str(out), "--threads", "-1"])
     assert "is no number of processors" in one_line(capsys) and not out.exists()
+    with pytest.raises(SystemExit):
+        cli.main(["diagnose", str(done[0]), "--out", str(out), "--patience", "0"])
+    assert "'0' is no number above 0" in one_line(capsys) and not out.exists()
 
 
 # a diagnosis that sends itself a signal as soon as it has kept so many simulations

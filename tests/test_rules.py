@@ -77,6 +77,7 @@ def test_what_closes_little_of_a_held_out_gap_is_an_answer_beside_which_more_is_
         {"closure": rules.CLOSES},
         {"gain_by_run": rules.HELD},
         {"gap_left": True},
+        {"unfinished": True},
         {"probability": rules.PROBABLE},
         {"held_out": HeldOut(before=1000.0, after=120.0, dof=100.0, changed=900.0)},
     ],
@@ -96,6 +97,7 @@ def test_just_inside_each_limit_it_is_still_named(allowed):
         {"rivals": True},
         {"once": True},
         {"gap_left": True, "runs": 1},
+        {"gap_left": True, "unfinished": True},
     ],
 )
 def test_each_of_these_alone_makes_it_ambiguous(doubt):

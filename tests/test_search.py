@@ -148,7 +148,9 @@ def reduced(total):
 
 def searching():
     base = SimpleNamespace(
-        bench=SimpleNamespace(simulator=SimpleNamespace(windows=[]), windows=np.arange(4)),
+        bench=SimpleNamespace(
+            simulator=SimpleNamespace(windows=[], stepped=0), windows=np.arange(4)
+        ),
         nuisances={},
         plain=SimpleNamespace(total=2000.0, variant=Variant(()), chi2=np.full(4, 500.0)),
         reduced=reduced(2000.0),
@@ -157,6 +159,7 @@ def searching():
         found=None,
         best=None,
         anew={},
+        patience=1.0,
     )
     return Fits(base, lambda line: None)
 
@@ -271,7 +274,7 @@ def test_what_others_were_weighed_beside_is_not_fitted_with_them_from_afar(monke
         asked.append(hypothesis.keys)
         return SimpleNamespace(price=100.0, fitted=None)
 
-    fits = SimpleNamespace(believed=believed, gap_after=lambda _: gap)
+    fits = SimpleNamespace(believed=believed, must_end=lambda: False, gap_after=lambda _: gap)
     monkeypatch.setattr(shortlist, "_first_few", lambda _, options, coarse: list(options))
     assert shortlist.best_of(fits, [with_wind, two], but=BOTH.keys)[1] is gap
     assert asked == [two.keys]
@@ -1204,6 +1207,34 @@ def chosen_by(tried):
     """A choice of the first of what was tried, which brings 320."""
     first = tried[0]
     return replace(chosen(first.hypothesis, [], [320.0]), fitted=first.fitted, tried=tried)
+
+
+@pytest.mark.parametrize("patience", [1.0, 3.0])
+def test_a_search_that_has_become_long_ends_with_what_it_has(fits, monkeypatch, patience):
+    """Twice as many steps as a usual search may take: the second effect waits for more patience."""
+    for before in ("as given", "track of rolling", "track of motor+rolling"):
+        fits.answers[("rolling", before)] = fit(1500.0, "rolling")
+        fits.answers[("motor+rolling", before)] = fit(1110.0, "rolling", "motor")
+    monkeypatch.setattr(hypotheses, "singles", lambda *_: [ONE])
+    monkeypatch.setattr(hypotheses, "pairs", lambda *_: [BOTH])
+    monkeypatch.setattr(
+        fits_of_hypotheses, "gap_after", lambda _, f: SimpleNamespace(exists=f.total > 1200.0)
+    )
+    monkeypatch.setattr(selection, "confirmed", lambda _base, _fitted, gap: gap)
+    monkeypatch.setattr(shortlist, "_commonest", lambda _, options: options[0])
+    monkeypatch.setattr(forward_selection, "is_worth", lambda *_: True)
+    believe(monkeypatch, lambda _: True)
+    monkeypatch.setattr(fits_of_hypotheses, "near_fit", lambda *_: None)
+    monkeypatch.setattr(
+        forward_selection, "promising", lambda _, best: [BOTH] if best.hypothesis is ONE else []
+    )
+    looking = searching()
+    looking.base.starts = ()
+    looking.base.patience = patience
+    looking.base.bench.simulator.stepped = int(2.0 * search_rules.LONGEST)
+    here = forward_selection.grown(looking)
+    assert looking.ended is (patience == 1.0)
+    assert here[0].hypothesis is (ONE if looking.ended else BOTH)
 
 
 def test_where_no_second_effect_stands_no_third_is_tried(fits, monkeypatch):

@@ -49,6 +49,14 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
     parser.add_argument(
         "--threads", type=options.processors, default=0, help="default: all processors"
     )
+    parser.add_argument(
+        "--patience",
+        type=options.positive,
+        metavar="TIMES",
+        default=1.0,
+        help="how long further effects are sought before the search ends, beside the usual; a "
+        "diagnosis that ended so says it; default: 1",
+    )
     options.add_output(parser, "out/diagnose")
     parser.set_defaults(run=run)
 

@@ -176,6 +176,14 @@ def number(text: str) -> float:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
+def positive(text: str) -> float:
+    """A number above 0, for argparse; one line else."""
+    value = number(text)
+    if value <= 0.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number above 0")
+    return value
+
+
 def part_of(text: str, option: str | None) -> float:
     """A finite number that is a part of what an option was given, as 0.25 in imu.csv=0.25.
 

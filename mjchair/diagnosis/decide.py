@@ -236,6 +236,7 @@ def standing(
         runs=len(base.bench.simulator.study.fitted),
         held_out=held,
         walls=_walls_that_count(base, choice),
+        unfinished=choice.unfinished,
     )
 
 

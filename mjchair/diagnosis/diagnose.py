@@ -71,6 +71,7 @@ def diagnose(
     say: Say = silent,
     store: Store | None = None,
     threads: int = 0,
+    patience: float = 1.0,
 ) -> Diagnosis:
     """Find where model and measurement disagree, and name the effect that is missing.
 
@@ -80,6 +81,8 @@ def diagnose(
       say: is called with the name of every stage as it begins.
       store: keeps simulations, so that a second start goes on from an interrupted one.
       threads: that simulate; 0: all processors. The result does not depend on their number.
+      patience: times as many simulations as usual, after which no further effect is sought. Only
+        long searches come to this end, and the diagnosis says so.
 
     Raises:
       MjchairError: a study that cannot be read or simulated, as one line.
@@ -92,6 +95,7 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"), without_engine_warnings():
         bench, first = prepare(known, say, store, threads)
         base = screen_columns(bench, first, study_effects(known, effects), say)
+        base.patience = patience
         found = explained(without_hidden(Fits(base, say)))
         say("the verdict, and the experiment to do next")
         return conclude(*found)

@@ -69,6 +69,11 @@ def notes_on(
     notes += _of_tipping(base.bench)
     notes += base.dropped
     notes += choice.dropped if choice else []
+    if choice is not None and choice.unfinished:
+        notes.append(
+            "the search for further effects ended before all were tried, since it had become long; "
+            f"--patience {2.0 * base.patience:g} goes on for longer"
+        )
     notes += [
         f"{name} stands at {bounded.WALL:g} standard deviations from what the study says of it: "
         "something is missing there, or the study is wrong about it"

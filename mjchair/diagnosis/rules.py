@@ -120,6 +120,7 @@ class Standing:
         as `may_be_all` says: they are where what is missing pushed them.
       uneven: whether an effect is not of one size in all runs.
       one_run: whether another, in one run alone, explains more. one_alike: or about as much.
+      unfinished: whether the search ended before all further effects were tried.
     """
 
     closure: float
@@ -137,6 +138,7 @@ class Standing:
     uneven: bool = False
     one_run: bool = False
     one_alike: bool = False
+    unfinished: bool = False
 
 
 def gap_exists(p: float, sigmas: float, gain: float = 0.0) -> bool:
@@ -178,7 +180,8 @@ def verdict(gap: bool, choice: Standing | None) -> Verdict:
     beside = choice.rivals or choice.once or choice.one_alike
     alone = not beside and choice.probability >= PROBABLE and not choice.walls
     # in a single run nothing tells an effect from what is left beside it
-    whole = not choice.gap_left or choice.runs > 1
+    # and what was not tried may stand beside it, or two in its place
+    whole = not choice.gap_left or (choice.runs > 1 and not choice.unfinished)
     held = choice.held_out
     carried = held is None or (carries_over(held) and not _may_stand_in(choice, held))
     named = sure(choice) and alone and whole and carried and choice.closure >= CLOSES

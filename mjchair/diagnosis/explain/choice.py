@@ -48,6 +48,7 @@ class Choice:
       own_gains: of every effect, the chi2 that it brings beside the others.
       tried: every fit that was made.
       dropped: a line for each hypothesis that this chair cannot have.
+      unfinished: whether effects are left that were not tried: the search had become too long.
     """
 
     hypothesis: Hypothesis
@@ -58,6 +59,7 @@ class Choice:
     others: list[Tried] = field(default_factory=list)
     tried: list[Tried] = field(default_factory=list)
     dropped: list[str] = field(default_factory=list)
+    unfinished: bool = False
 
     @property
     def own(self) -> Tried:

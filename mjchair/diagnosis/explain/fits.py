@@ -54,6 +54,7 @@ class Fits:
       dropped: a line for each hypothesis that this chair cannot have.
       exchanged: fits, each with a track in whose states it was tried.
       gaps: that fits leave, each with its fit.
+      ended: whether the search ended before it had come to its end.
       near: the linear algebra that weighs; None: that of the base. latest: the last around a fit.
     """
 
@@ -67,6 +68,7 @@ class Fits:
         self.dropped: list[str] = []
         self.exchanged: list[tuple[Fitted, Track]] = []
         self.gaps: list[tuple[Fitted, Gap]] = []
+        self.ended = False
         self.near = near_fit(base, base.found) if base.found else None
         self.latest: NearFit | None = None
 
@@ -261,6 +263,14 @@ class Fits:
         self.gaps = [known for known in self.gaps if known[0] is not fitted]
         self.latest = None
         return True
+
+    def must_end(self) -> bool:
+        """Whether the search has simulated so much that it ends here; then it has `ended`."""
+        base = self.base
+        stepped = base.bench.simulator.stepped
+        if search_rules.is_too_long(stepped=stepped, patience=base.patience):
+            self.ended = True
+        return self.ended
 
     def gap_after(self, fitted: Fitted) -> Gap:
         """The gap that a fit leaves, sought once."""

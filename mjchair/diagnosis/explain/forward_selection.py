@@ -52,6 +52,8 @@ def _grown_from(fits: Fits, here: WithGap | None) -> WithGap | None:
         left = here is None or here[1].exists
         if size == 1 and left and _happened_once(fits, brought := _brought(fits, here)):
             return None if _is_rather_once(fits, brought) else here
+        if here is not None and fits.must_end():
+            break
         size += 1
         best = here[0] if here else None
         more = further(fits, best, size) if left or best is None else _hidden_beside(fits, best)

@@ -80,6 +80,7 @@ class Base:
         sought; None: none brings enough, or this chair cannot have it.
       anew: keys of effects -> the columns of others around their fit (columns_anew.py).
       looked: what was seen at whole sizes (whole_sizes.py), which are looked at twice.
+      patience: times the usual number of steps that the search may simulate.
     """
 
     bench: Bench
@@ -95,6 +96,7 @@ class Base:
     best: Found | None = None
     anew: dict[frozenset[str], dict[ColumnId, Column]] = field(default_factory=dict)
     looked: dict[Hashable, Any] = field(default_factory=dict, init=False)
+    patience: float = 1.0
 
     @cached_property
     def acting_alone(self) -> ActingIn | None:

@@ -28,6 +28,9 @@ from mjchair.diagnosis.rules import (
 Array = NDArray[np.float64]
 # how hypotheses grow and shrink
 MOST = 3  # effects that are added
+# simulated steps after which no further effect is sought (assumption): most studies take 3 to 10
+# million, those whose windows are sought afresh in every fit up to 60
+LONGEST = 3e7
 # chi2 by which two effects at once are rarer than one of them: 2 ln(0.35 / (0.2 * 2 / 35)), of the
 # priors in probability.py and of 35 effects
 TOGETHER = 6.8
@@ -141,6 +144,15 @@ def beyond_form(*, own: float, gain: float) -> bool:
       own: chi2 that it brings beside the others. gain: that all bring together.
     """
     return own >= LEFT_BY_FORM * gain
+
+
+def is_too_long(*, stepped: int, patience: float) -> bool:
+    """Whether a search has simulated so much that no further effect is sought.
+
+    Args:
+      stepped: simulated steps. patience: times LONGEST.
+    """
+    return stepped > patience * LONGEST
 
 
 def worth_adding(*, gained: float, parameters: int, held: float, gain: float) -> bool:

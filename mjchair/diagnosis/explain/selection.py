@@ -95,6 +95,7 @@ def _choice(fits: Fits, best: Tried, fitted: Fitted, rivals: list[list[Tried]]) 
         own_gains=own_gains(fits, best),
         tried=fits.tried,
         dropped=fits.dropped,
+        unfinished=fits.ended,
     )
 
 

@@ -103,6 +103,8 @@ def best_of(
     listed = [h for h in few if not but or not set(but) <= set(h.keys)]
     top = left = None
     for h in listed:
+        if top is not None and fits.must_end():
+            break
         more = fits.believed(h, top)
         if more is not None and (top is None or more.price < top.price):
             top, left = more, None

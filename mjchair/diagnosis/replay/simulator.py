@@ -94,6 +94,7 @@ class WindowSimulator:
 
     Attributes:
       study, channels, windows: what is simulated. step: of the simulation, s.
+      stepped: steps that were asked for so far, simulated or loaded.
       rolls: of every window, whether a channel shows that the chair rolls as it begins.
       turned: of every run, the measured angles that wrap, by channel, with their turns counted.
     """
@@ -108,6 +109,7 @@ class WindowSimulator:
         """Cut the runs; simulations are kept in the store, where there is one."""
         self.store = store
         self.threads = threads
+        self.stepped = 0
         self.study = study
         self.channels = study.channels
         self.spec = without_visual_geoms(study.spec)
@@ -250,6 +252,7 @@ class WindowSimulator:
         Args:
           trace: what is asked for along the way, after each step, of COURSE.
         """
+        self.stepped += sum(self.steps(job.model, job.window) - job.begin for job in jobs)
         if self.store is None or trace:
             return self._simulate(jobs, trace)
         key = self._key(jobs, self.store)
