@@ -37,7 +37,7 @@ MORE = 4  # further ones, as where casters flip
 SHIMMYING = 10  # rounds where casters shimmy: a search begins far from where it ends
 LITTLE = 0.1  # of the misfit there, which a step must promise: more rounds bring no other answer
 MUCH = 0.1  # of the misfit: a step that promised as much, and failed, came of wrong answers
-ENOUGH = 0.5  # of what a step promised: where it brings more, the answers are not made anew
+ENOUGH = 0.5  # of what a step promised: where it brings more, the answers stay as they are
 FINER = 0.1  # of the steps of finite differences, where a step of the fit failed
 # of misfit, in variances of the sensors' noise, that the step of a round promises
 PROMISE = 4.0  # from which answers to the slow state are made anew where it led
@@ -97,7 +97,8 @@ class Search:
       touchy: whether a step failed, so that answers are made at the fine step, of small changes.
       shimmies: whether a caster does, in the window.
       slow: how the channels answer to the slow state, (rows, channels, 11), times chair.STEPS;
-        fresh: whether these answers were made at the best.
+        fresh: whether these answers were made at the best. corrected: or made elsewhere, and
+        corrected by what the last step brought.
     """
 
     state: State
@@ -109,6 +110,7 @@ class Search:
     touchy: bool = False
     shimmies: bool = False
     fresh: bool = False
+    corrected: bool = False
     slow: Array = field(default_factory=lambda: np.empty(0))
     predicted: Array = field(default_factory=lambda: np.empty(0))
     trace: dict[str, Array] = field(default_factory=dict)
@@ -217,10 +219,14 @@ def _fit_round(chair: Searched, search: Mapping[int, Search]) -> None:
     states = {i: s.state for i, s in search.items()}
     for i, shown in tried(chair, states).items():
         s = search[i]
-        before, promised = s.size, s.promise
+        size, promised, seen = s.size, s.promise, s.predicted
         if s.judge(*shown):
             good.append(i)
-            s.fresh = not chair.kept or (s.touchy and not before - s.size > ENOUGH * promised)
+            poor = s.touchy and seen.size > 0 and not size - s.size > ENOUGH * promised
+            s.fresh = not chair.kept or (poor and s.corrected)
+            s.corrected = poor and not s.fresh
+            if s.corrected:
+                s.slow = _corrected(s.slow, s.change / STEPS, s.predicted - seen)
             if s.fresh:
                 asked[i] = s.best
         elif not (s.touchy and s.fresh) and _leads_astray(s, stands(simulator, i, s.best)):
@@ -239,6 +245,16 @@ def _fit_round(chair: Searched, search: Mapping[int, Search]) -> None:
             continue
         s.change = change * STEPS
         s.state = simulator.chair.moved(s.state, s.change)
+
+
+def _corrected(slow: Array, change: Array, brought: Array) -> Array:
+    """Answers that are right of the last step: Broyden's update (Math. Comp. 19, 577, 1965).
+
+    Args:
+      change: that step, in units of chair.STEPS, (11,). brought: what it changed, (rows, channels).
+    """
+    missed = brought - slow @ change
+    return np.asarray(slow + missed[..., None] * change / max(float(change @ change), 1e-30))
 
 
 def _answer_anew(chair: Searched, search: Mapping[int, Search], asked: Mapping[int, State]) -> None:
