@@ -1,6 +1,6 @@
 """A size beyond which nothing changes has a least one; chi2 is told instead of simulated."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -37,8 +37,12 @@ def ended(moment, total, promised=None):
     return End(Variant((), terms=(term,)), total, total if promised is None else promised)
 
 
-def looked(monkeypatch, chi2, size=0.5):
-    """What is found where an effect held at a size leaves `chi2`, and the sizes held."""
+def looked(monkeypatch, chi2, size=0.5, std=0.03):
+    """What is found where an effect held at a size leaves `chi2`, and the sizes held.
+
+    Args:
+      std: of the size where it is looked at.
+    """
     held = []
 
     def refit(bench, begin, track, nuisances, rounds=None):
@@ -52,7 +56,8 @@ def looked(monkeypatch, chi2, size=0.5):
     monkeypatch.setattr(open_ended, "refit", refit)
     monkeypatch.setattr(open_ended, "nuisances_of", lambda *_: {})
     base = SimpleNamespace(bench=None, plain=SimpleNamespace(total=PLAIN))
-    return open_ended.with_least_sizes(base, ended(size, chi2(size))), held
+    begun = replace(ended(size, chi2(size)), std={MOMENT: std})
+    return open_ended.with_least_sizes(base, begun), held
 
 
 def test_a_size_near_its_bound_is_not_open(monkeypatch):
@@ -60,6 +65,17 @@ def test_a_size_near_its_bound_is_not_open(monkeypatch):
     high = next(p.high for p in find("caster_friction").parameters if p.name == "moment")
     found, held = looked(monkeypatch, lambda moment: 3000.0, size=0.6 * high)
     assert held == [] and found.std[MOMENT] == 0.03 and not found.at_least
+
+
+def test_a_size_near_its_bound_that_changes_nothing_is_open(monkeypatch):
+    """A stuck caster of 4 N m, which had come to 6.3 of at most 10, was named 6.3 +- 3e9 N m."""
+    found, held = looked(
+        monkeypatch, lambda moment: 3000.0 if moment > 0.36 else PLAIN, size=6.3, std=3e9
+    )
+    assert held[0] == 10.0
+    assert found.at_least[MOMENT] == pytest.approx(0.36, rel=RESOLVED)
+    value = found.variant.terms[0].values["moment"]
+    assert value + found.std[MOMENT] == pytest.approx(10.0)
 
 
 def test_a_stuck_caster_has_at_least_the_friction_at_which_it_sticks(monkeypatch):
@@ -160,7 +176,8 @@ def test_a_side_on_which_there_is_nothing_is_not_looked_at(monkeypatch):
     monkeypatch.setattr(open_ended, "refit", refit)
     monkeypatch.setattr(open_ended, "nuisances_of", lambda *_: {})
     base = SimpleNamespace(bench=None, plain=SimpleNamespace(total=PLAIN))
-    begun = End(Variant((), terms=(term,)), 3000.0, 3000.0)
+    known = {ParameterId("bearing_friction", side): 0.03 for side in ("left", "right")}
+    begun = End(Variant((), terms=(term,)), 3000.0, 3000.0, std=known)
     assert open_ended.with_least_sizes(base, begun) is begun
     assert {values["right"] for values in held} == {0.0}
 

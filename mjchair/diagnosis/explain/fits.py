@@ -294,8 +294,8 @@ def with_form_errors(fitted: Fitted) -> Fitted:
     """The fit, with standard errors that the form of its effects allows.
 
     At hundreds of standard errors the data tell a size better than its effect tells what a chair
-    does. The errors of sensors have the form that they are given. What only shapes an effect is
-    known to its bounds where the data do not tell it.
+    does. The errors of sensors have the form that they are given. What the data do not tell is
+    known to its bounds.
     """
     std = dict(fitted.std)
     for term in fitted.variant.terms:
@@ -303,8 +303,7 @@ def with_form_errors(fitted: Fitted) -> Fitted:
             if p.sized and term.effect.sensor is None:
                 size = abs(term.values[p.name] - p.neutral)
                 std[key] = math.hypot(std[key], search_rules.SIZE_BY_FORM * size)
-            elif not p.sized:
-                std[key] = min(std[key], p.high - p.low)
+            std[key] = min(std[key], p.high - p.low)
     return replace(fitted, std=std)
 
 
