@@ -364,6 +364,10 @@ class LinearFits(Fits):
     def begin_at(self, fewer: Hypothesis, more: Any) -> None:
         """Nothing: a linear fit is the same from wherever it begins."""
 
+    def with_least_sizes(self, tried: Any) -> Any:
+        """The fit itself: of a linear system every size is told."""
+        return tried
+
     def anew(self, tried: Any) -> Any:
         """The fit itself: a linear system is the same around any chair."""
         return tried.fitted
@@ -434,6 +438,7 @@ def _fit(base: Any, hypothesis: Hypothesis) -> Any:
         std=std,
         sigmas=sigmas,
         at_bound=tuple(stuck),
+        at_least={},
         columns=hypothesis.columns,
     )
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mjchair.diagnosis import decide
+from mjchair.diagnosis import decide, notes
 from mjchair.diagnosis.explain import open_ended
 from mjchair.diagnosis.fit.column_ids import ParameterId
 from mjchair.diagnosis.fit.variant import Term, Variant
@@ -113,6 +113,19 @@ def test_an_effect_of_an_open_size_is_as_sure_as_what_it_brings():
     assert decide._sigmas(choice) == (1.3, 10.0)
     fitted.at_least[MOMENT] = 0.25
     assert decide._sigmas(choice) == (60.0, 10.0)
+
+
+def test_of_sizes_that_are_open_upwards_only_the_least_is_told():
+    """Casters held fast were named "left +2.32 ± 8.2 N m, left less right +1.86 ± 9.1 N m"."""
+    effect, values = caster_friction.ONE_SIDED, {"left": 2.3, "right": 0.46, "slope": 1.9}
+    term = Term(effect, values, tuple(values))
+    keys = {side: ParameterId(effect.key, side) for side in ("left", "right")}
+    fitted = SimpleNamespace(
+        std={key: 3.0 for key in keys.values()}, at_least={}, std_of_difference=lambda *_: 4.0
+    )
+    assert "left less right" in notes.remark(fitted, term)
+    fitted.at_least = dict.fromkeys(keys.values(), 0.24)
+    assert notes.remark(fitted, term) == ""
 
 
 def test_a_size_that_data_tell_is_left_alone_after_one_look(monkeypatch):

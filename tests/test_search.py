@@ -80,6 +80,7 @@ def fit(total, *keys, promised=None):
         track=Named(f"track of {'+'.join(sorted(keys))}"),
         sigmas=dict.fromkeys(keys, 3.0),
         at_bound=(),
+        at_least={},
         correlation={},
         anew=None,
     )
@@ -1178,7 +1179,12 @@ def _single(start, chi2, **offsets):
     """A fit of one effect, with roughly known numbers moved by standard deviations."""
     variant = Variant((), offsets=offsets)
     fitted = SimpleNamespace(
-        confined=0.0, total=sum(chi2), chi2=np.array(chi2), at_bound=(), variant=variant
+        confined=0.0,
+        total=sum(chi2),
+        chi2=np.array(chi2),
+        at_bound=(),
+        at_least={},
+        variant=variant,
     )
     return Tried(Hypothesis((start,), gain=900.0, score=890.0), fitted)
 
@@ -1207,6 +1213,40 @@ def chosen_by(tried):
     """A choice of the first of what was tried, which brings 320."""
     first = tried[0]
     return replace(chosen(first.hypothesis, [], [320.0]), fitted=first.fitted, tried=tried)
+
+
+@pytest.mark.parametrize(
+    ("open_upwards", "best", "believed"),
+    [
+        (True, None, True),
+        (False, None, False),  # nothing is known of it, and no larger size fits as well
+        (True, 1400.0, False),  # another fits better, so nobody asks
+    ],
+)
+def test_a_size_that_is_open_upwards_is_believed_at_its_least(
+    fits, monkeypatch, open_upwards, best, believed
+):
+    """Casters held fast by 4 N m brought 4000 of chi2, and were no answer: not determined."""
+    fits.answers[("rolling", "as given")] = unknown = fit(1500.0, "rolling")
+    fits.answers[("rolling", "track of rolling")] = unknown
+    key = ParameterId("rolling", "size")
+    least = fit(1503.0, "rolling")
+    least.at_least = {key: 0.3} if open_upwards else {}
+    asked = []
+
+    def with_least_sizes(_, fitted):
+        asked.append(fitted)
+        return least
+
+    monkeypatch.setattr(fits_of_hypotheses.open_ended, "with_least_sizes", with_least_sizes)
+    monkeypatch.setattr(fits_of_hypotheses, "believable", lambda f: bool(f.at_least))
+    looking = searching()
+    top = None if best is None else Tried(replace(ONE, gain=600.0), fit(best, "motor"))
+    found = looking.believed(ONE, top)
+    assert (found is not None) == believed and bool(asked) == (best is None)
+    if believed:
+        assert found.fitted is least and looking.believed(ONE).fitted is least
+        assert len(asked) == 1
 
 
 @pytest.mark.parametrize("patience", [1.0, 3.0])
@@ -1415,7 +1455,7 @@ def test_a_wind_that_ends_nearly_still_is_no_wind(sigmas, there):
     still = Term(air_drag.EFFECT, air_drag.EFFECT.neutral(), ("drag_area",))
     for term, expected in ((blows, there), (still, True)):
         ended = SimpleNamespace(
-            variant=Variant((), terms=(term,)), sigmas={term.effect.key: sigmas}
+            variant=Variant((), terms=(term,)), sigmas={term.effect.key: sigmas}, at_least={}
         )
         assert choice.is_there(ended) is expected
 

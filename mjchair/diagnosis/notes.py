@@ -228,8 +228,12 @@ def of_uneven(one: Uneven) -> str:
 
 
 def remark(fitted: Fitted, term: Term) -> str:
-    """What the values of an effect say in a sentence; empty where they say it themselves."""
-    if term.effect.remark is None:
+    """What the values of an effect say in a sentence; empty where they say it themselves.
+
+    So do sizes that are open upwards, of which only the least is told.
+    """
+    is_open = any(key.effect == term.effect.key for key in fitted.at_least)
+    if term.effect.remark is None or is_open:
         return ""
     std = {p.name: fitted.std.get(key, 0.0) for key, p in term.parameters}
     sides = [ParameterId(term.effect.key, side) for side in SIDES]

@@ -84,10 +84,15 @@ class Choice:
 def is_there(fitted: Fitted) -> bool:
     """Whether effects are there by their own sizes, and not by numbers that only shape them.
 
-    A wind has a drag area, so one that ends nearly still stands for the drag of the air.
+    A wind has a drag area, so one that ends nearly still stands for the drag of the air. Of a size
+    that is open upwards no standard error tells.
     """
     shaped = [t for t in fitted.variant.terms if any(not p.sized for _, p in t.parameters)]
-    return all(search_rules.is_there(sigmas=fitted.sigmas[t.effect.key]) for t in shaped)
+    return all(
+        search_rules.is_there(sigmas=fitted.sigmas[t.effect.key])
+        or any(parameter.effect == t.effect.key for parameter in fitted.at_least)
+        for t in shaped
+    )
 
 
 def is_pushed(rival: Tried, chosen: Tried, brought: float) -> bool:

@@ -54,6 +54,7 @@ class Fits:
       dropped: a line for each hypothesis that this chair cannot have.
       exchanged: fits, each with a track in whose states it was tried.
       gaps: that fits leave, each with its fit.
+      looked: fits of which least sizes were sought.
       ended: whether the search ended before it had come to its end.
       near: the linear algebra that weighs; None: that of the base. latest: the last around a fit.
     """
@@ -68,6 +69,7 @@ class Fits:
         self.dropped: list[str] = []
         self.exchanged: list[tuple[Fitted, Track]] = []
         self.gaps: list[tuple[Fitted, Gap]] = []
+        self.looked: list[Fitted] = []
         self.ended = False
         self.near = near_fit(base, base.found) if base.found else None
         self.latest: NearFit | None = None
@@ -148,12 +150,30 @@ class Fits:
         return min(parts, key=attrgetter("total"), default=None)
 
     def believed(self, hypothesis: Hypothesis, best: Tried | None = None) -> Tried | None:
-        """The fit, where every parameter is off its bounds and known better than beforehand."""
+        """The fit, where every parameter is off its bounds and known better than beforehand.
+
+        Or its least sizes, where it would be the best and far larger ones fit as well: these are
+        known, though nothing tells by how much a caster is held that never turned.
+        """
         tried = self.fit(hypothesis, best)
         if tried is None or believable(tried.fitted):
             return tried
+        if best is None or tried.price < best.price:
+            least = self.with_least_sizes(tried)
+            if least.fitted.at_least and believable(least.fitted):
+                return least
         self._note(f"{hypothesis.label} is no answer: a number of it is not determined")
         return None
+
+    def with_least_sizes(self, tried: Tried) -> Tried:
+        """The fit with the least sizes that fit alike, which takes its place; it is sought once."""
+        if any(tried.fitted is known for known in self.looked):
+            return tried
+        fitted = open_ended.with_least_sizes(self.base, tried.fitted)
+        self.looked.append(fitted)
+        least = Tried(tried.hypothesis, fitted)
+        self.tried[:] = [least if t.fitted is tried.fitted else t for t in self.tried]
+        return least
 
     def begin_at(self, fewer: Hypothesis, more: Fitted) -> None:
         """Make the fit of fewer effects from where more of them ended, if that can be.
@@ -308,13 +328,17 @@ def with_form_errors(fitted: Fitted) -> Fitted:
 
 
 def believable(fitted: Fitted) -> bool:
-    """Whether every size is there, off its bounds, and known better than beforehand."""
+    """Whether every size is there, off its bounds, and known better than beforehand.
+
+    A size than which far larger ones fit as well need not be known: the least one is.
+    """
     sized = [(key, p) for term in fitted.variant.terms for key, p in term.parameters if p.sized]
+    closed = [(key, p) for key, p in sized if key not in fitted.at_least]
     return (
         is_there(fitted)
-        and not fitted.at_bound
+        and not set(fitted.at_bound) - fitted.at_least.keys()
         and all(
             search_rules.believable(std=fitted.std[key], change=p.change, width=p.high - p.low)
-            for key, p in sized
+            for key, p in closed
         )
     )
