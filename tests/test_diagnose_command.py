@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import browser
 import mujoco
@@ -18,6 +19,7 @@ from mjchair import cli
 from mjchair.commands import diagnose
 from mjchair.commands.diagnose import CANDIDATE, GAP
 from mjchair.diagnosis.replay.cache import Store
+from mjchair.diagnosis.replay.simulator import Job, Outcome, Sofar, WindowSimulator
 from mjchair.diagnosis.result import Diagnosis, GapSummary, NamedEffect
 from mjchair.diagnosis.rules import Verdict
 from mjchair.effects.library import find
@@ -239,6 +241,7 @@ INTERRUPTED = """
 import os, signal, sys
 from mjchair import cli
 from mjchair.diagnosis.replay.cache import Store
+from mjchair.diagnosis.replay.simulator import Job, Outcome, Sofar, WindowSimulator
 from mjchair.storage import only_writer
 number, after = int(sys.argv[1]), int(sys.argv[2])
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job ignores Ctrl-C
@@ -310,6 +313,21 @@ def test_a_simulation_that_was_cut_short_is_made_again(tmp_path):
         path.write_bytes(whole[:size])
         assert store.load("a") is None
         path.write_bytes(whole)
+
+
+def test_what_was_kept_counts_as_simulated(tmp_path):
+    """So a search that was interrupted ends where one that was not does."""
+    simulator = SimpleNamespace(
+        store=Store(tmp_path),
+        stepped=0,
+        steps=lambda *_: 500,
+        _key=lambda *_: "a",
+        _simulate=lambda jobs, _: [Outcome(np.ones(3)) for _ in jobs],
+    )
+    jobs = [Job(None, None, None), Job(None, None, None, sofar=Sofar(200, None, None))]
+    for times in (1, 2):
+        WindowSimulator.run(simulator, jobs)
+        assert simulator.stepped == 800 * times
 
 
 def test_two_diagnoses_do_not_write_into_one_folder(done, tmp_path, capsys):

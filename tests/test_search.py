@@ -1579,6 +1579,32 @@ def test_what_data_do_not_tell_of_a_shape_is_known_to_its_bounds():
     assert std[moment] == pytest.approx(np.hypot(0.2, 2.0 * search_rules.SIZE_BY_FORM))
 
 
+def test_no_size_is_known_less_than_to_its_bounds():
+    """A caster that was held fast had 6.3 +- 3e9 N m."""
+    term = Term(find("caster_friction"), {"moment": 6.3, "slope": 2.0}, ("moment",))
+    ((moment, p),) = term.parameters
+    told = SimpleNamespace(variant=Variant((), terms=(term,)), std={moment: 3e9})
+    with mock.patch.object(fits_of_hypotheses, "replace", put):
+        assert fits_of_hypotheses.with_form_errors(told).std[moment] == p.high - p.low
+
+
+@pytest.mark.parametrize("at_bound", [False, True])
+def test_a_size_that_is_open_upwards_need_not_be_known(at_bound):
+    """No standard error tells by how much a caster is held that never turned."""
+    term = Term(find("caster_friction"), {"moment": 6.3, "slope": 2.0}, ("moment", "slope"))
+    (moment, _), (slope, _) = term.parameters
+    held = SimpleNamespace(
+        variant=Variant((), terms=(term,)),
+        sigmas={"caster_friction": 0.1},
+        std={moment: 8.0, slope: 0.1},
+        at_bound=(moment,) if at_bound else (),
+        at_least={},
+    )
+    assert not fits_of_hypotheses.believable(held)
+    held.at_least[moment] = 0.24
+    assert fits_of_hypotheses.believable(held)
+
+
 def test_ends_are_alike_within_a_tenth_of_a_standard_error():
     term = Term(air_drag.EFFECT, {"drag_area": 0.5}, ("drag_area",))
     ((key, _),) = term.parameters

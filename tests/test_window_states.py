@@ -187,6 +187,14 @@ def test_answers_are_corrected_and_then_made_anew_where_a_step_brings_less_than_
     assert search.slow == what and asked == ([0] if what == "new" else [])
 
 
+@pytest.mark.parametrize("kept", [True, False])
+def test_before_the_first_step_nothing_is_known_of_the_answers_of_a_chair_near_by(kept):
+    search = window_search.Search("tried", "best", 9.0, touchy=True, predicted=np.zeros((4, 2)))
+    before = window_search.Search("tried", "tried", touchy=True)
+    window_search._weigh_answers(search, before, kept)
+    assert not search.corrected and search.fresh is not kept
+
+
 @pytest.mark.parametrize(("placed", "shimmies"), [(True, False), (False, True)])
 def test_what_a_window_cannot_tell_is_not_simulated(placed, shimmies, monkeypatch):
     """The prior of a position that no channel sees holds it."""

@@ -54,8 +54,8 @@ def add(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
         type=options.positive,
         metavar="TIMES",
         default=1.0,
-        help="how long further effects are sought before the search ends, beside the usual; a "
-        "diagnosis that ended so says it; default: 1",
+        help="times as many simulations as usual before the search for further effects ends; a "
+        "diagnosis whose search ended so says it; default: 1",
     )
     options.add_output(parser, "out/diagnose")
     parser.set_defaults(run=run)

@@ -177,7 +177,7 @@ def number(text: str) -> float:
 
 
 def positive(text: str) -> float:
-    """A number above 0, for argparse; one line else."""
+    """A number above 0, as the type of an option."""
     value = number(text)
     if value <= 0.0:
         raise argparse.ArgumentTypeError(f"{text!r} is no number above 0")

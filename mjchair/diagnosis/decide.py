@@ -47,7 +47,7 @@ from mjchair.diagnosis.explain.run_by_run import uneven
 from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit import bounded
 from mjchair.diagnosis.fit.column_ids import ParameterId, RoughlyKnown
-from mjchair.diagnosis.fit.nonlinear import Fitted
+from mjchair.diagnosis.fit.nonlinear import Fitted, held_by_bounds, open_upwards
 from mjchair.diagnosis.fit.process import NAMED, level
 from mjchair.diagnosis.fit.slow_part import BAND
 from mjchair.diagnosis.material import material
@@ -213,7 +213,7 @@ def _nearest(base: Base, choice: Choice, closed: float) -> Nearest:
         effects=tuple(t.effect.key for t in choice.fitted.variant.terms),
         closure=closed,
         remainder=over_noise(*slow_part(choice.fitted.system, _shown_windows(base))),
-        ends=tuple((key.effect, key.parameter) for key in _at_bound(choice.fitted)),
+        ends=tuple((key.effect, key.parameter) for key in held_by_bounds(choice.fitted)),
     )
 
 
@@ -229,7 +229,7 @@ def standing(
         gain_by_run=held_out_gain(base, fitted),
         gain_by_manoeuvre=held_out_gain(base, fitted, "manoeuvre"),
         sigmas=_sigmas(choice),
-        at_bound=bool(_at_bound(fitted)),
+        at_bound=bool(held_by_bounds(fitted)),
         probability=of_effects(probability, choice.hypothesis.keys),
         rivals=bool(exchanged(choice)),
         once=_once(base, choice, held),
@@ -240,18 +240,13 @@ def standing(
     )
 
 
-def _at_bound(fitted: Fitted) -> list[ParameterId]:
-    """The sizes that ended on a bound, but for those than which far larger ones fit as well."""
-    return [key for key in fitted.at_bound if key not in fitted.at_least]
-
-
 def _sigmas(choice: Choice) -> tuple[float, ...]:
     """Of every effect, how far it is from neutral in standard errors.
 
     Where far larger sizes fit as well, no standard error tells; what the effect brings does.
     """
     fitted, own = choice.fitted, choice.brought
-    endless = {parameter.effect for parameter in fitted.at_least}
+    endless = open_upwards(fitted)
     return tuple(
         math.sqrt(max(own[key], 0.0)) if key in endless else sigmas
         for key, sigmas in fitted.sigmas.items()

@@ -20,7 +20,7 @@ from mjchair.diagnosis.explain.screening import Base
 from mjchair.diagnosis.fit import bounded, process
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.column_ids import ParameterId
-from mjchair.diagnosis.fit.nonlinear import Fitted, at_end
+from mjchair.diagnosis.fit.nonlinear import Fitted, at_end, open_upwards
 from mjchair.diagnosis.fit.variant import Term
 from mjchair.diagnosis.result import MissingForce
 from mjchair.diagnosis.rules import Verdict
@@ -232,8 +232,7 @@ def remark(fitted: Fitted, term: Term) -> str:
 
     So do sizes that are open upwards, of which only the least is told.
     """
-    is_open = any(key.effect == term.effect.key for key in fitted.at_least)
-    if term.effect.remark is None or is_open:
+    if term.effect.remark is None or term.effect.key in open_upwards(fitted):
         return ""
     std = {p.name: fitted.std.get(key, 0.0) for key, p in term.parameters}
     sides = [ParameterId(term.effect.key, side) for side in SIDES]

@@ -179,8 +179,8 @@ def verdict(gap: bool, choice: Standing | None) -> Verdict:
     # beside a number that is pushed to its wall, what pushes it may be all that is missing
     beside = choice.rivals or choice.once or choice.one_alike
     alone = not beside and choice.probability >= PROBABLE and not choice.walls
-    # in a single run nothing tells an effect from what is left beside it
-    # and what was not tried may stand beside it, or two in its place
+    # in a single run nothing tells an effect from what is left beside it; what was not tried may
+    # stand beside an effect, or two in its place
     whole = not choice.gap_left or (choice.runs > 1 and not choice.unfinished)
     held = choice.held_out
     carried = held is None or (carries_over(held) and not _may_stand_in(choice, held))

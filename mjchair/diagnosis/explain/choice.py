@@ -14,7 +14,7 @@ from mjchair.diagnosis.explain.gap import Gap
 from mjchair.diagnosis.explain.hypotheses import Hypothesis
 from mjchair.diagnosis.explain.screening import Base, gain
 from mjchair.diagnosis.fit import bounded
-from mjchair.diagnosis.fit.nonlinear import Fitted
+from mjchair.diagnosis.fit.nonlinear import Fitted, open_upwards
 
 FURTHER = 3.5  # sigmas of a test whose statistic may count as left
 
@@ -90,7 +90,7 @@ def is_there(fitted: Fitted) -> bool:
     shaped = [t for t in fitted.variant.terms if any(not p.sized for _, p in t.parameters)]
     return all(
         search_rules.is_there(sigmas=fitted.sigmas[t.effect.key])
-        or any(parameter.effect == t.effect.key for parameter in fitted.at_least)
+        or t.effect.key in open_upwards(fitted)
         for t in shaped
     )
 

@@ -38,7 +38,7 @@ from mjchair.diagnosis.explain.screening import (
     goes_far,
     nuisances_of,
 )
-from mjchair.diagnosis.fit.nonlinear import Fitted, placed
+from mjchair.diagnosis.fit.nonlinear import Fitted, held_by_bounds, placed
 from mjchair.diagnosis.replay.window_states import Track
 from mjchair.errors import MjchairError
 
@@ -54,7 +54,7 @@ class Fits:
       dropped: a line for each hypothesis that this chair cannot have.
       exchanged: fits, each with a track in whose states it was tried.
       gaps: that fits leave, each with its fit.
-      looked: fits of which least sizes were sought.
+      least: fits of which the least sizes were sought, as they then stand.
       ended: whether the search ended before it had come to its end.
       near: the linear algebra that weighs; None: that of the base. latest: the last around a fit.
     """
@@ -69,7 +69,7 @@ class Fits:
         self.dropped: list[str] = []
         self.exchanged: list[tuple[Fitted, Track]] = []
         self.gaps: list[tuple[Fitted, Gap]] = []
-        self.looked: list[Fitted] = []
+        self.least: list[Fitted] = []
         self.ended = False
         self.near = near_fit(base, base.found) if base.found else None
         self.latest: NearFit | None = None
@@ -160,17 +160,17 @@ class Fits:
             return tried
         if best is None or tried.price < best.price:
             least = self.with_least_sizes(tried)
-            if least.fitted.at_least and believable(least.fitted):
+            if believable(least.fitted):
                 return least
         self._note(f"{hypothesis.label} is no answer: a number of it is not determined")
         return None
 
     def with_least_sizes(self, tried: Tried) -> Tried:
         """The fit with the least sizes that fit alike, which takes its place; it is sought once."""
-        if any(tried.fitted is known for known in self.looked):
+        if any(tried.fitted is known for known in self.least):
             return tried
         fitted = open_ended.with_least_sizes(self.base, tried.fitted)
-        self.looked.append(fitted)
+        self.least.append(fitted)
         least = Tried(tried.hypothesis, fitted)
         self.tried[:] = [least if t.fitted is tried.fitted else t for t in self.tried]
         return least
@@ -336,7 +336,7 @@ def believable(fitted: Fitted) -> bool:
     closed = [(key, p) for key, p in sized if key not in fitted.at_least]
     return (
         is_there(fitted)
-        and not set(fitted.at_bound) - fitted.at_least.keys()
+        and not held_by_bounds(fitted)
         and all(
             search_rules.believable(std=fitted.std[key], change=p.change, width=p.high - p.low)
             for key, p in closed

@@ -372,6 +372,16 @@ def on_bound(term: Term) -> list[ParameterId]:
     return [key for key in at_end(term) if term.effect.parameter(key.parameter).sized]
 
 
+def held_by_bounds(fitted: Fitted) -> list[ParameterId]:
+    """The sizes that ended on a bound, but for those than which far larger ones fit as well."""
+    return [key for key in fitted.at_bound if key not in fitted.at_least]
+
+
+def open_upwards(fitted: Fitted) -> set[str]:
+    """Keys of the effects of which far larger sizes fit as well."""
+    return {parameter.effect for parameter in fitted.at_least}
+
+
 def at_end(term: Term) -> list[ParameterId]:
     """The parameters of an effect that lie on a bound, but for where the effect is not there."""
     out = []

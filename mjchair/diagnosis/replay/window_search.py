@@ -6,6 +6,7 @@ what the channels show from there, and how they answer to the slow state.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -219,14 +220,10 @@ def _fit_round(chair: Searched, search: Mapping[int, Search]) -> None:
     states = {i: s.state for i, s in search.items()}
     for i, shown in tried(chair, states).items():
         s = search[i]
-        size, promised, seen = s.size, s.promise, s.predicted
+        before = copy.copy(s)
         if s.judge(*shown):
             good.append(i)
-            poor = s.touchy and seen.size > 0 and not size - s.size > ENOUGH * promised
-            s.fresh = not chair.kept or (poor and s.corrected)
-            s.corrected = poor and not s.fresh
-            if s.corrected:
-                s.slow = _corrected(s.slow, s.change / STEPS, s.predicted - seen)
+            _weigh_answers(s, before, chair.kept)
             if s.fresh:
                 asked[i] = s.best
         elif not (s.touchy and s.fresh) and _leads_astray(s, stands(simulator, i, s.best)):
@@ -245,6 +242,22 @@ def _fit_round(chair: Searched, search: Mapping[int, Search]) -> None:
             continue
         s.change = change * STEPS
         s.state = simulator.chair.moved(s.state, s.change)
+
+
+def _weigh_answers(search: Search, before: Search, kept: bool) -> None:
+    """After a step that was taken: keep the answers, correct them, or ask for new ones (`fresh`).
+
+    Args:
+      before: the search before the step. kept: whether answers are of a chair near by.
+    """
+    brought = before.size - search.size
+    first = before.predicted.size == 0  # no step led here, so nothing is known of the answers
+    poor = search.touchy and not first and brought <= ENOUGH * before.promise
+    search.fresh = not kept or (poor and search.corrected)
+    search.corrected = poor and not search.fresh
+    if search.corrected:
+        shown = search.predicted - before.predicted
+        search.slow = _corrected(search.slow, search.change / STEPS, shown)
 
 
 def _corrected(slow: Array, change: Array, brought: Array) -> Array:
