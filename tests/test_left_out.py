@@ -166,6 +166,16 @@ def test_what_a_fit_moved_of_a_sensor_is_no_change_where_its_effect_takes_it_ove
     assert left_out.on_held_out(base, fitted).changed > 1.0
 
 
+def test_a_corrected_chair_is_as_far_from_held_out_runs_as_it_leaves_them(base):
+    plain, held = base.plain, left_out.held_windows(base)
+    assert left_out.on_held_out(base, plain).farther == 0.0
+    cells = [replace(c, total=c.total + 30.0) for c in plain.system.cells]
+    worse = replace(plain, system=replace(plain.system, cells=cells))
+    by = left_out.on_held_out(base, worse).farther
+    assert by == pytest.approx(30.0 * held.size)
+    assert left_out.on_held_out(base, plain, fewer=worse).farther == pytest.approx(-by)
+
+
 def foretold(rng, sizes, missing=0.0):
     """Chi2 over its dof of two held-out runs, foretold by two that were fitted to, and as they are.
 

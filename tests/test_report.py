@@ -358,6 +358,8 @@ def test_what_is_named_beside_more_that_is_missing_is_no_last_word():
     assert falls in first_screen.missing(found)
     found.gap = dataclasses.replace(found.gap, after=2.95)
     assert "of the fit; those held out stay at 3.0 times the" in first_screen.missing(found)
+    found.gap = dataclasses.replace(found.gap, after=3.2)
+    assert "in those held out it grows from 3.00 to 3.20 times" in first_screen.missing(found)
     found.gap = dataclasses.replace(found.gap, scope="", after=0.9)
     found.correction = Variant((), {"mass": -3.0, "centre_x": 2.0})
     said = "only with a chair at the end of what the study allows (the mass of chair and person "

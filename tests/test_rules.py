@@ -71,6 +71,20 @@ def test_what_closes_little_of_a_held_out_gap_is_an_answer_beside_which_more_is_
     assert said(held_out=replace(held, after=315.0)) == Verdict.UNKNOWN
 
 
+def test_a_corrected_chair_that_is_worse_on_held_out_runs_is_not_named():
+    """Its effects carry over, but not with all else that the fit moved to explain what is left."""
+    held = HeldOut(before=6714.0, after=1809.0, dof=178.0, changed=9221.0)
+    assert rules.carries_over(held)
+    assert said(held_out=replace(held, farther=held.scatter)) == Verdict.NAMED
+    worse = replace(held, farther=1.1 * held.scatter)
+    assert said(held_out=worse) == Verdict.AMBIGUOUS
+    assert rules.believed(0.98, replace(CLEAR, held_out=worse)) == 0.98
+    alone = replace(CLEAR, held_out=replace(held, after=held.dof, farther=held.scatter))
+    assert not rules.more_missing(alone)
+    grown = replace(alone.held_out, farther=1.1 * held.scatter)
+    assert rules.more_missing(replace(alone, held_out=grown))
+
+
 @pytest.mark.parametrize(
     "allowed",
     [

@@ -150,8 +150,14 @@ def on_held_out(base: Base, fitted: Fitted, fewer: Fitted | None = None) -> rule
         return None
     plain = fewer or base.plain
     before, dof = _foretold(base, plain, held)
-    after, changed = _foretold(base, fitted, held)[0], _changed(base, plain, fitted, held)
-    return rules.HeldOut(before=before, after=after, dof=dof, changed=changed)
+    stands, corrected = (slow_part(f.system, held)[0] for f in (plain, fitted))
+    return rules.HeldOut(
+        before=before,
+        after=_foretold(base, fitted, held)[0],
+        dof=dof,
+        changed=_changed(base, plain, fitted, held),
+        farther=corrected - stands,
+    )
 
 
 def speaks_against(base: Base, fitted: Fitted, fewer: Fitted) -> bool:
