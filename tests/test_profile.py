@@ -15,7 +15,8 @@ import pytest
 
 from mjchair.diagnosis.explain import multistart, profile
 from mjchair.diagnosis.explain.fits import with_form_errors
-from mjchair.diagnosis.fit.column_ids import ParameterId
+from mjchair.diagnosis.fit import bounded
+from mjchair.diagnosis.fit.column_ids import ParameterId, RoughlyKnown
 from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.variant import Term, Variant
 from mjchair.effects.library import find
@@ -179,21 +180,72 @@ def test_an_effect_is_as_certain_as_less_of_it_loses(size, lost, sigmas):
     assert profile._as_lost(wider, fitted, seen).sigmas["wind"] == pytest.approx(sigmas)
 
 
-def test_all_numbers_of_a_load_are_asked_since_a_mass_stands_in_for_it(stuck, monkeypatch):
+def as_load(fitted, of_mass=0.0):
+    """The fit as one of a load: y is no size, as its height, and a mass stands in for x.
+
+    By `of_mass` x is other where the mass is a standard deviation off.
+    """
+    shape = replace(WIND.parameter("y"), sized=False)
+    parameters = tuple(shape if p.name == "y" else p for p in WIND.parameters)
+    load = replace(WIND, instead=("mass",), parameters=parameters)
+    (term,) = fitted.variant.terms
+    variant = replace(fitted.variant, terms=(replace(term, effect=load),))
+    places = {ParameterId("wind", "x"): 0, RoughlyKnown("mass"): 1}
+    by = of_mass / WIND.parameter("x").change  # columns are of sizes worth finding
+    system = SimpleNamespace(places=places, by=by)
+    return replace(fitted, variant=variant, system=system)
+
+
+@pytest.fixture
+def covariance(monkeypatch):
+    """Of x and of the mass, which is known to half of what it was known to beforehand."""
+    monkeypatch.setattr(
+        bounded,
+        "covariance",
+        lambda system, _: np.array([[1.0, -0.25 * system.by], [-0.25 * system.by, 0.25]]),
+    )
+
+
+WINDOWS = SimpleNamespace(bench=SimpleNamespace(windows=[0]), nuisances={})
+
+
+def test_all_numbers_of_a_load_are_asked_since_a_mass_stands_in_for_it(
+    stuck, covariance, monkeypatch
+):
     """Chi2 between them was flat, and columns told the load to 1.2 kg: 16 kg of 25."""
     begun = told(TRUTH, NAMES, promised=chi2(TRUTH))
     assert profile.followed(BASE, begun) is begun
-    shape = replace(WIND.parameter("y"), sized=False)  # as the height of a load
-    parameters = tuple(shape if p.name == "y" else p for p in WIND.parameters)
-    load = replace(WIND, instead=("mass",), parameters=parameters)
-    (term,) = begun.variant.terms
-    begun = replace(begun, variant=replace(begun.variant, terms=(replace(term, effect=load),)))
     monkeypatch.setattr(profile, "_freed", lambda *_: None)
     held = []
     one = profile._held
     monkeypatch.setattr(profile, "_held", lambda *a: held.append(a[2].parameter) or one(*a))
-    profile.followed(BASE, begun)
+    profile.followed(WINDOWS, as_load(begun))
     assert sorted(held) == ["x", "x", "y", "y"]
+
+
+@pytest.mark.parametrize(("of_mass", "away"), [(0.2, 0.2), (0.01, 3.0 * 0.01)])
+def test_a_load_is_held_as_far_off_as_the_mass_that_stands_in_may_be(
+    stuck, covariance, monkeypatch, of_mass, away
+):
+    """By columns a load was 46.4 +- 0.8 kg; 40 kg fit better, with the mass 8 % higher."""
+    begun, asked = as_load(told(TRUTH, NAMES, promised=3000.0), of_mass), []
+    fit = profile.made_anew
+
+    def made(bench, start, before, columns=None):
+        asked.append((start.terms[0].values["x"], columns))
+        return fit(bench, start, before, columns)
+
+    monkeypatch.setattr(profile, "made_anew", made)
+    x = ParameterId("wind", "x")
+    for side in (-1.0, 1.0):
+        found = profile._held(WINDOWS, begun, x, side, profile.AWAY)
+        assert found.size == asked[-1][0] == pytest.approx(TRUTH[0] + side * away)
+        assert (asked[-1][1] is None) == (away > 0.1)  # all columns are made there
+    farther = profile._held(WINDOWS, begun, x, -1.0, 2.0 * profile.AWAY)
+    assert farther.size == pytest.approx(TRUTH[0] - 2.0 * away)
+    # a mass that was told exactly is no column, and stands in for nothing
+    del begun.system.places[RoughlyKnown("mass")]
+    assert profile._held(WINDOWS, begun, x, 1.0, 3.0).size == pytest.approx(TRUTH[0] + 0.03)
 
 
 def test_a_valley_that_is_flat_is_followed(stuck):
