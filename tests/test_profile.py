@@ -248,6 +248,14 @@ def test_a_load_is_held_as_far_off_as_the_mass_that_stands_in_may_be(
     assert profile._held(WINDOWS, begun, x, 1.0, 3.0).size == pytest.approx(TRUTH[0] + 0.03)
 
 
+def test_what_only_shapes_an_effect_does_not_say_whether_it_is_there():
+    """A load of 24.3 +- 4.6 kg stood at 3.9 sigma, because its height became less well known."""
+    load = as_load(told(TRUTH, NAMES, 3000.0))
+    x, y = (ParameterId("wind", name) for name in NAMES)
+    assert profile._widened(load, {x: 0.01, y: 0.1}).sigmas == load.sigmas
+    assert profile._widened(load, {x: 0.1, y: 0.01}).sigmas == {"wind": pytest.approx(4.0)}
+
+
 def test_a_valley_that_is_flat_is_followed(stuck):
     """Where a size far away fits alike, columns that are made there may show a way down."""
     begun = told(TRUTH, NAMES, promised=chi2(TRUTH))

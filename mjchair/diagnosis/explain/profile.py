@@ -275,10 +275,16 @@ def _as_lost(wider: Fitted, fitted: Fitted, seen: Sequence[Held]) -> Fitted:
 
 
 def _widened(fitted: Fitted, std: Mapping[ParameterId, float]) -> Fitted:
-    """The fit with standard errors that are at least these, and effects as much less certain."""
+    """The fit with standard errors that are at least these, and effects as much less certain.
+
+    What only shapes an effect, as the height of a load, says nothing of whether it is there: a load
+    that brought 1400 of chi2, of 24.3 +- 4.6 kg, was no answer because its height was not known.
+    """
+    numbers = _numbers(fitted)
     wider = {key: max(error, std[key]) for key, error in fitted.std.items()}
     sigmas = dict(fitted.sigmas)
     for key, error in wider.items():
-        narrower = fitted.std[key] / error
-        sigmas[key.effect] = min(sigmas[key.effect], fitted.sigmas[key.effect] * narrower)
+        if numbers[key].sized:
+            narrower = fitted.std[key] / error
+            sigmas[key.effect] = min(sigmas[key.effect], fitted.sigmas[key.effect] * narrower)
     return replace(fitted, std=wider, sigmas=sigmas)
