@@ -19,7 +19,7 @@ from mjchair.diagnosis.explain.column_ids import Driver, Quantity
 from mjchair.diagnosis.fit import process
 from mjchair.diagnosis.fit.nonlinear import refit
 from mjchair.diagnosis.fit.variant import Term, Variant
-from mjchair.diagnosis.next_experiment import design, wording
+from mjchair.diagnosis.next_experiment import design, ranking, wording
 from mjchair.diagnosis.next_experiment.comparison import Evidence, Experiment
 from mjchair.diagnosis.next_experiment.design import Plan, telling
 from mjchair.diagnosis.next_experiment.manoeuvres import LIBRARY, Setting, possible, setting
@@ -32,6 +32,7 @@ from mjchair.effects.library import find
 from mjchair.errors import MjchairError
 from mjchair.measurement.trial import Trial
 from mjchair.model import inertials
+from mjchair.report import diagnosis_page
 from mjchair.simulation.initial import Initial, start
 from mjchair.simulation.inputs import Inputs
 
@@ -169,7 +170,7 @@ def test_what_must_be_large_is_not_the_simplest(one_way):
     assert found.best.least == max(e.least for e in found.experiments)
     assert "repetitions" in wording.deciding(found, bench.simulator)
     simple = design.plan(bench, rolling, [slope], either, doubts=(), needed=[9.0])
-    assert simple.best.least > design.PLENTY and simple.best.manoeuvre.name == "coast across"
+    assert simple.best.least > ranking.PLENTY and simple.best.manoeuvre.name == "coast across"
 
 
 def test_no_torque_and_no_load_is_asked_for_where_a_coast_decides(one_way):
@@ -177,11 +178,30 @@ def test_no_torque_and_no_load_is_asked_for_where_a_coast_decides(one_way):
     few = [BY_NAME["loaded coast"], BY_NAME["coast reversed"], BY_NAME["coast"]]
     decided = design.plan(bench, rolling, [slope], few, doubts=())
     assert [e.manoeuvre.name for e in decided.experiments] == ["coast reversed", "coast"]
-    assert decided.best.least > design.PLENTY
+    assert decided.best.least > ranking.PLENTY
     open_still = design.plan(bench, rolling, [slope], few, doubts=(), needed=[1e6])
     assert {e.manoeuvre.name for e in open_still.experiments} == {m.name for m in few}
     both = {e.manoeuvre.name: e.separations for e in open_still.experiments}
     assert all(both[e.manoeuvre.name] == e.separations for e in decided.experiments)
+
+
+def test_t_is_no_more_than_a_rival_differs_that_is_not_fitted_again(one_way, monkeypatch):
+    """So it is enough to compare in full what may be first or second by it."""
+    _, _, bench, (rolling, _, bearing) = one_way
+    some = [m for m in LIBRARY if m.torque is None and not m.stands]
+    few = design.plan(bench, rolling, [bearing], some)
+    bound = ranking.at_most
+    monkeypatch.setattr(ranking, "at_most", lambda *a: bound(*a) + 1e9)
+    all_of_them = design.plan(bench, rolling, [bearing], some)
+    assert not any(e.at_most for e in all_of_them.experiments)
+    compared = [e for e in few.experiments if not e.at_most]
+    assert ranking.TOGETHER <= len(compared) < len(some) == len(all_of_them.experiments)
+    for one, other in zip(compared[:2], all_of_them.experiments[:2], strict=True):
+        assert one.manoeuvre == other.manoeuvre
+        assert one.separations == pytest.approx(other.separations, rel=1e-6)
+    least = {e.manoeuvre.name: e.least for e in all_of_them.experiments}
+    most = {e.manoeuvre.name: e.least for e in few.experiments if e.at_most}
+    assert most and all(t >= least[name] > 0.0 for name, t in most.items())
 
 
 def test_nothing_separates_a_chair_from_itself(one_way):
@@ -385,6 +405,11 @@ def test_the_words_say_what_to_do_and_what_to_see(one_way):
     assert "0.2 rad/s lower if it is sensor bias of imu_gyro.z" in said
     assert " Or " not in said and "repeat" not in said
     assert " Or " in wording.deciding(plan_of(25.0, 24.0), simulator)
+    best, other = plan_of(25.0, 24.0).experiments
+    bound = replace(plan_of(25.0), experiments=(best, replace(other, at_most=True)))
+    assert " Or " not in wording.deciding(bound, simulator)
+    table = diagnosis_page._experiments(SimpleNamespace(evidence=SimpleNamespace(plan=bound)))
+    assert [row.cells[1] for row in table.rows] == ["5.0", "at most 4.9"]
     assert "repeat it 3 times" in wording.deciding(plan_of(3.5), simulator)
     assert "No manoeuvre of the library decides" in wording.deciding(plan_of(0.0), simulator)
     few = (BY_NAME["loaded slalom"], BY_NAME["coast reversed"])

@@ -19,6 +19,7 @@ import matplotlib
 from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
+from mjchair.diagnosis.next_experiment.comparison import Experiment
 from mjchair.diagnosis.next_experiment.wording import plain, plain_together, roughly_known
 from mjchair.diagnosis.result import Candidate, Diagnosis
 from mjchair.effects.library import find
@@ -291,10 +292,15 @@ def _experiments(diagnosis: Diagnosis) -> Table:
         *(Head(f"from {plain_together(r)} (sigma)", True) for r in plan.rivals),
     ]
     rows = [
-        Row([e.manoeuvre.name, *(f"{t**0.5:.1f}" for t in e.separations)], chosen=k == 0)
+        Row([e.manoeuvre.name, *(_separated(e, t) for t in e.separations)], chosen=k == 0)
         for k, e in enumerate(plan.experiments[:EXPERIMENTS])
     ]
     return Table(heads, rows)
+
+
+def _separated(experiment: Experiment, t: float) -> str:
+    """T, chi2, in sigma; of what was not compared in full, what it is at most."""
+    return f"{'at most ' if experiment.at_most else ''}{t**0.5:.1f}"
 
 
 def _experiments_note(diagnosis: Diagnosis) -> str:
@@ -306,7 +312,8 @@ def _experiments_note(diagnosis: Diagnosis) -> str:
         f"{shown} of {len(plan.experiments)} manoeuvres, best first, and simplest first where "
         "they decide with a margin, simulated with the corrected chair: how far each explanation "
         "would fall behind after everything that is only roughly known, and its own parameters, "
-        "have been fitted."
+        'have been fitted. "At most" is how far it differs before they are, where that is enough '
+        "to see that another manoeuvre comes first."
     )
 
 

@@ -35,10 +35,12 @@ class Experiment:
 
     Attributes:
       manoeuvre: which. separations: T against each rival, chi2.
+      at_most: whether T is no more than these, and was not sought further.
     """
 
     manoeuvre: Manoeuvre
     separations: tuple[float, ...]
+    at_most: bool = False
 
     @property
     def least(self) -> float:
@@ -117,10 +119,9 @@ class Comparison:
             except (MjchairError, np.linalg.LinAlgError) as error:
                 self.dropped.append(f"{against.name} was not rehearsed: {error}")
 
-    def experiment(self, which: int, held: Sequence[Against]) -> Experiment:
-        """A manoeuvre, and what it tells apart."""
-        separations = tuple(float(self.apart[against].least[which]) for against in held)
-        return Experiment(self.rehearsal.manoeuvres[which], separations)
+    def separations(self, which: int, held: Sequence[Against]) -> dict[Against, float]:
+        """T of a manoeuvre against each rival, chi2."""
+        return {against: float(self.apart[against].least[which]) for against in held}
 
     def evidence(self, which: int, held: Against) -> Evidence | None:
         """Where a rival differs most in a manoeuvre; None: a force of any course."""

@@ -19,14 +19,9 @@ from itertools import groupby
 from mjchair.diagnosis.fit.bench import Bench
 from mjchair.diagnosis.fit.nonlinear import Fitted
 from mjchair.diagnosis.fit.variant import Variant
-from mjchair.diagnosis.next_experiment.comparison import (
-    Against,
-    Comparison,
-    Evidence,
-    Experiment,
-)
+from mjchair.diagnosis.next_experiment.comparison import Against, Evidence, Experiment
 from mjchair.diagnosis.next_experiment.manoeuvres import Manoeuvre, possible, setting
-from mjchair.diagnosis.next_experiment.rehearsal import Rehearsal, version
+from mjchair.diagnosis.next_experiment.ranking import Ranking
 from mjchair.diagnosis.next_experiment.separation import Doubts
 from mjchair.diagnosis.replay.pulses import Force
 from mjchair.effects.effect import Effect
@@ -39,9 +34,6 @@ OUTSIDE = {
     Force.YAW: "a turning moment from outside the library",
 }
 ENOUGH = 9.0  # chi2, three sigmas, that decide
-# chi2, ten sigmas, or three times what is needed: T is linear, and above this a simple manoeuvre is
-# worth more than a larger T
-PLENTY, MARGIN = 100.0, 3.0
 
 
 @dataclass(frozen=True)
@@ -50,8 +42,9 @@ class Plan:
 
     Attributes:
       chosen: name of the hypothesis that was rehearsed. rivals: names of the others.
-      experiments: that were rehearsed. evidence: of the best, against each rival; None: a force
-        has none. torque: its largest, N m.
+      experiments: that were compared, and then those of which is known only what T is at most, so
+        that they are neither first nor second. evidence: of the best, against each rival; None: a
+        force has none. torque: its largest, N m.
       dropped: a line for each rival or doubt that this chair cannot have.
       run: of the study, from whose place and heading the manoeuvres start.
       needed: T against each rival that decides, chi2.
@@ -84,7 +77,8 @@ def plan(
 
     Of those that separate by PLENTY, and by MARGIN times what is needed, the one that stands first
     is taken, as the simplest. Those with torque, and then those with a load, are rehearsed only
-    where none before them separates so much.
+    where none before them separates so much; and T is sought only of those that may be first or
+    second by what it is at most.
 
     Args:
       bench: of the study. chosen: the chair that is rehearsed.
@@ -101,33 +95,25 @@ def plan(
     made = manoeuvres or telling(possible(here), [chosen.variant, *(r.variant for r in rivals)])
     held = _held(chosen, rivals, needed) if rivals else _forces(chosen)
     doubted = Doubts(bench, chosen, _doubted(chosen, rivals, doubts))
-    parts: list[Comparison] = []
+    ranking = Ranking(bench, here, held, doubted)
     for some in _simple_first(made):
-        rehearsal = Rehearsal(bench, here, some, version(chosen))
-        parts.append(Comparison(bench, rehearsal, held, doubted))
-        if _has_plenty(parts):
+        ranking.add(some)
+        if ranking.has_plenty:
             break
-    parts = [part for part in parts if part.rehearsal.any_possible] or parts[:1]
-    lines = [*doubted.dropped, *(line for part in parts for line in part.dropped)]
-    dropped = tuple(dict.fromkeys(lines))
-    kept = _in_all(parts)
+    dropped = ranking.dropped
+    kept = ranking.kept
     if not kept:
         raise MjchairError("no experiment can be planned: " + "; ".join(dropped))
-    needs = [k.needed for k in kept]
-    ranked = sorted(
-        ((part, i, part.experiment(i, kept)) for part in parts for i in part.places),
-        key=lambda entry: -_share(entry[2], needs),
-    )
-    part, best, _ = ranked[0]
+    part, best = ranking.best
     return Plan(
         chosen=tuple(k.chosen for k in kept),
         rivals=tuple(k.name for k in kept),
-        experiments=tuple(experiment for *_, experiment in ranked),
+        experiments=tuple(ranking.experiments),
         evidence=tuple(part.evidence(best, k) for k in kept),
         torque=here.largest(part.rehearsal.manoeuvres[best]),
         dropped=dropped,
         run=here.run,
-        needed=tuple(needs),
+        needed=tuple(k.needed for k in kept),
     )
 
 
@@ -170,28 +156,6 @@ def _simple_first(manoeuvres: Sequence[Manoeuvre]) -> list[list[Manoeuvre]]:
         return 2 if m.load is not None else int(m.torque is not None)
 
     return [list(some) for _, some in groupby(sorted(manoeuvres, key=rank), key=rank)]
-
-
-def _in_all(parts: Sequence[Comparison]) -> list[Against]:
-    """The rivals that could be rehearsed in every part."""
-    return [k for k in parts[0].apart if all(k in part.apart for part in parts)]
-
-
-def _has_plenty(parts: Sequence[Comparison]) -> bool:
-    """Whether a manoeuvre has plenty against every rival: no further one comes before it."""
-    held = _in_all(parts)
-    needs = [k.needed for k in held]
-    return bool(held) and any(
-        part.rehearsal.any_possible and _share(part.experiment(i, held), needs) >= 1.0
-        for part in parts
-        for i in part.places
-    )
-
-
-def _share(experiment: Experiment, needed: Sequence[float]) -> float:
-    """The smallest T over the rivals beside what is plenty against each, at most 1."""
-    pairs = zip(experiment.separations, needed, strict=True)
-    return min(min(t / max(PLENTY, MARGIN * least), 1.0) for t, least in pairs)
 
 
 def _doubted(

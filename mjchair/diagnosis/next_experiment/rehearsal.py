@@ -97,7 +97,6 @@ class Rehearsal:
       any_possible: whether there is one. first: their states at the start.
       simulator: of their windows. whitener: of the noise that the study has.
       chair: that makes them. track: of it, from its own states.
-      process: what shakes the chair, as strong as in the study; None: nothing.
     """
 
     def __init__(
@@ -106,6 +105,7 @@ class Rehearsal:
         """Simulate the manoeuvres."""
         self.manoeuvres = list(manoeuvres)
         self.chair = chair
+        self.bench = bench
         self.known: dict[object, mujoco.MjModel] = {}
         self.threads = bench.simulator.threads
         self._plan(bench, setting)
@@ -123,7 +123,6 @@ class Rehearsal:
         self._plan(bench, setting, [o.predicted for o in made])
         self.whitener = Whitener(self.simulator, bench.noise)
         self.track = self._track(chair, [o.trace for o in made])
-        self.process = None if bench.process is None else self._shaken(bench, bench.process)
 
     def _plan(self, bench: Bench, setting: Setting, shown: Sequence[Array] = ()) -> None:
         """Cut the manoeuvres into windows; `shown` is what the channels show of each, if known."""
@@ -245,9 +244,13 @@ class Rehearsal:
         asked = [p for p in pulses(self.simulator) if p.force in process.SHAKEN]
         return asked, pulse_answers(self.simulator, self.track, asked, self.chair.variant.edit)
 
-    def _shaken(self, bench: Bench, known: Process) -> Process:
-        """The process of the study, at the mean level of the runs that were fitted to."""
-        fitted = list(bench.simulator.study.fitted)
+    @cached_property
+    def process(self) -> Process | None:
+        """What shakes the chair, at the mean level of the runs that were fitted to; or nothing."""
+        known = self.bench.process
+        if known is None:
+            return None
+        fitted = list(self.bench.simulator.study.fitted)
         runs = len(self.simulator.study.runs)
         levels = {
             part: np.full(runs, np.sqrt(np.mean(np.square(level[fitted]))))

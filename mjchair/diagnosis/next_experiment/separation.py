@@ -74,6 +74,22 @@ def separation(
     return Separated(np.array(least), np.array(steps))
 
 
+def at_most(rehearsal: Rehearsal, rival: Fitted) -> Array:
+    """What T (m,), chi2, is no more than: how far a rival differs that is not fitted again.
+
+    Only the windows begin where they like, and nothing shakes the chair.
+    """
+    simulator = rehearsal.simulator
+    (theirs,) = rehearsal.predict([version(rival)])
+    out = np.zeros(len(rehearsal.manoeuvres))
+    for i, w in enumerate(simulator.windows):
+        miss = residual(rehearsal.shown[i], theirs[i], simulator.channels)
+        nothing = np.zeros((*miss.shape, 0))
+        window = eliminate_window(simulator, rehearsal.track, rehearsal.whitener, i, miss, nothing)
+        out[w.run] += window.chi2
+    return out
+
+
 def _rival_columns(rehearsal: Rehearsal, rival: Fitted) -> tuple[Column, dict[ColumnId, Column]]:
     """What a rival's chair shows of every window, and how that answers to its parameters."""
     middle = version(rival)

@@ -11,7 +11,8 @@ from collections.abc import Collection, Sequence
 from mjchair.diagnosis.data.roughly_known import Nuisance
 from mjchair.diagnosis.explain.column_ids import Driver, Quantity
 from mjchair.diagnosis.next_experiment.comparison import Evidence
-from mjchair.diagnosis.next_experiment.design import ENOUGH, PLENTY, Plan
+from mjchair.diagnosis.next_experiment.design import ENOUGH, Plan
+from mjchair.diagnosis.next_experiment.ranking import PLENTY
 from mjchair.diagnosis.replay.simulator import WindowSimulator
 from mjchair.model.wheels import base_name
 from mjchair.simulation.channels import channels
@@ -36,7 +37,7 @@ def deciding(plan: Plan, simulator: WindowSimulator) -> str:
             said.append(_evidence(evidence, chosen, rival, units[evidence.channel]))
     said += _again(plan)
     near = max(CLOSE * min(best.least, PLENTY), 1.0)
-    others = [e for e in plan.experiments[1:2] if e.least > near]
+    others = [e for e in plan.experiments[1:2] if e.least > near and not e.at_most]
     said += [f"Or {_lower(e.manoeuvre.words)} ({_sigmas(e.least)})." for e in others]
     return " ".join(said)
 
