@@ -19,4 +19,5 @@ EFFECT = Effect(
     signature="v^2, against the motion",
     source="a seated person: drag area 0.5-0.8 m^2 (Hoerner 1965, seated)",
     edit=edit,
+    common=4.0,  # the chairs of this project have no drag, every real one has
 )

@@ -4,9 +4,10 @@ In: fits, and the choice. Out: a hypothesis that is better than the choice, or N
 stands among the fits. Constant and viscous friction of a bearing are nearly a rolling resistance
 with the drag of the air, so one effect may close the gap that two others made. No pair is fitted
 then, and what linear algebra around the chair without effects promises of it is rough. So a pair
-that it promises to be better is fitted as well where it is hardly probable, since single effects
-are more common: an air drag of 0.9 m^2 with a rolling resistance promised 13 of chi2 more than a
-bearing's friction of 95 %, and brings 15 more. An effect whose answer is no straight line of its
+that it promises to be about as good is fitted as well where it is hardly probable, since single
+effects are more common: an air drag of 0.9 m^2 with a rolling resistance promised 13 of chi2 more
+than a bearing's friction of 95 %, and brings 15 more; one of 0.8 m^2 promised 6 less with the price
+of its numbers, and fits as well. An effect whose answer is no straight line of its
 size brings more than that: a wind of 3.6 m/s came 5 % behind a slope with a bearing's friction, and
 was better than both once it was fitted. Where several effects were found while the noise was
 sought, single ones that are near the best single one were not fitted either: a centre of mass 48 mm
@@ -16,6 +17,7 @@ the drag of the air.
 
 from __future__ import annotations
 
+from mjchair.diagnosis import rules
 from mjchair.diagnosis.explain import hypotheses, search_rules
 from mjchair.diagnosis.explain.calibration import holds
 from mjchair.diagnosis.explain.choice import Choice, Tried
@@ -25,7 +27,7 @@ from mjchair.diagnosis.explain.probability import probabilities, shown
 from mjchair.diagnosis.explain.rivals import better_of
 
 FITTED = 3  # hypotheses, at most
-LEAST = 0.005  # probability of what is fitted
+LEAST = 5e-4  # probability of what is weighed for that
 
 
 def better_than(fits: Fits, choice: Choice) -> Tried | None:
@@ -45,7 +47,7 @@ def _best_of_size(fits: Fits, hypothesis: Hypothesis, chosen: Tried) -> Tried:
 
 def _not_yet_fitted(fits: Fits, choice: Choice) -> list[Hypothesis]:
     """What linear algebra alone has weighed, most probable first: the probable, and what promises
-    to be better than the choice. Then single effects that are just behind several, or behind the
+    about as much as the choice. Then single effects that are just behind several, or behind the
     best single one."""
     probability = probabilities(fits.base, choice)
     known = {t.hypothesis.name for t in fits.tried}
@@ -57,15 +59,16 @@ def _not_yet_fitted(fits: Fits, choice: Choice) -> list[Hypothesis]:
     if found:
         worth = shown(probability, choice.hypothesis.name)
         promised = fits.weigh(choice.hypothesis.starts)
-        found = [h for h in found if h.name in worth or _is_ahead(h, promised)]
+        found = [h for h in found if h.name in worth or _is_near(h, promised)]
     beside = known.union(h.name for h in found)
     left = [h for h in singles if h.name not in beside and _may_be_better(h, singles, choice)]
     return [*sorted(found, key=lambda h: -probability[h.name]), *left][:FITTED]
 
 
-def _is_ahead(hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
-    """Whether linear algebra promises more of other effects than of those that were chosen."""
-    return hypothesis.score > chosen.score and not holds(hypothesis.name, chosen.name)
+def _is_near(hypothesis: Hypothesis, chosen: Hypothesis) -> bool:
+    """Whether linear algebra promises about as much of other effects as of those chosen."""
+    near = hypothesis.score > chosen.score - rules.RIVAL_CHI2
+    return near and not holds(hypothesis.name, chosen.name)
 
 
 def _may_be_better(single: Hypothesis, singles: list[Hypothesis], choice: Choice) -> bool:

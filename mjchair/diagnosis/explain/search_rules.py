@@ -34,6 +34,8 @@ LONGEST = 3e7
 # chi2 by which two effects at once are rarer than one of them: 2 ln(0.35 / (0.2 * 2 / 35)), of the
 # priors in probability.py and of 35 effects
 TOGETHER = 6.8
+# how common what every chair has otherwise than its model is, over most effects (assumption)
+USUAL = 4.0
 PENALTY = 10.0  # chi2 that a parameter must bring: log of the number of samples
 WORTH = 15.0  # chi2 that a further effect must bring besides the penalty of its parameters
 LINEAR = 0.1  # share of its gain by which the linear promise of a hypothesis may be wrong
