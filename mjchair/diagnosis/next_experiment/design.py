@@ -42,8 +42,8 @@ class Plan:
 
     Attributes:
       chosen: name of the hypothesis that was rehearsed. rivals: names of the others.
-      experiments: that were compared, and then those of which is known only what T is at most, so
-        that they are neither first nor second. evidence: of the best, against each rival; None: a
+      experiments: that were compared, and then those of which is known only what T is at most:
+        enough to see that others come first. evidence: of the best, against each rival; None: a
         force has none. torque: its largest, N m.
       dropped: a line for each rival or doubt that this chair cannot have.
       run: of the study, from whose place and heading the manoeuvres start.
